@@ -1,0 +1,39 @@
+"""One formula, three arithmetics: floats, intervals with outward rounding, and duals of either."""
+
+from tpm_design.arithmetic import kernel_cache  # noqa: F401  (before Numba)
+
+# isort: split
+from tpm_design.arithmetic.compilation import FAST_MATH
+from tpm_design.arithmetic.dual import Dual, variables
+from tpm_design.arithmetic.formula import formula
+from tpm_design.arithmetic.functions import (
+    arctangent2,
+    cosine,
+    direction_cosine,
+    greater,
+    lesser,
+    magnitude,
+    pos,
+    root,
+    sine,
+    sqr,
+)
+from tpm_design.arithmetic.interval import Interval
+
+__all__ = [
+    "FAST_MATH",
+    "Dual",
+    "Interval",
+    "arctangent2",
+    "cosine",
+    "direction_cosine",
+    "formula",
+    "greater",
+    "lesser",
+    "magnitude",
+    "pos",
+    "root",
+    "sine",
+    "sqr",
+    "variables",
+]

@@ -1,0 +1,63 @@
+"""The options that compiled code of this package states, and how operators are registered with Numba.
+
+A function without options of its own inherits those of whichever caller happens to be compiled first. With
+``fastmath`` that would void every interval bound, so everything registered here states all three options.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from tpm_design.arithmetic import kernel_cache  # noqa: F401  (before Numba)
+
+# isort: split
+from numba import types
+from numba.extending import overload
+
+Function = Callable[..., Any]
+
+# every fast-math licence but nnan and ninf, which make isnan always false
+FAST_MATH = {"contract", "reassoc", "nsz", "arcp", "afn"}
+
+FAST: Any = {"fastmath": FAST_MATH, "error_model": "numpy", "forceinline": True}
+STRICT: Any = {"fastmath": False, "error_model": "numpy", "forceinline": False}
+
+
+def is_number(kind: Any) -> bool:
+    """Whether a Numba type is a plain real number."""
+    return isinstance(kind, types.Float | types.Integer)
+
+
+def register_operator(
+    operation: Function,
+    owned: Callable[[Any], bool],
+    plain: Callable[[Any], bool],
+    both: Function,
+    left: Function,
+    right: Function,
+) -> None:
+    """Overload a binary operator of parameters ``a, b`` for the types that ``owned`` recognises.
+
+    ``both`` serves two owned operands; ``left`` and ``right`` those where the other one is ``plain``.
+    """
+
+    def choose(a: Any, b: Any) -> Function | None:
+        if owned(a) and owned(b):
+            return both
+        if owned(a) and plain(b):
+            return left
+        if plain(a) and owned(b):
+            return right
+        return None
+
+    overload(operation, jit_options=STRICT, strict=False)(choose)
+
+
+def register_unary(operation: Function, owned: Callable[[Any], bool], implementation: Function) -> None:
+    """Overload a unary operator of parameter ``a`` for the types that ``owned`` recognises."""
+
+    def choose(a: Any) -> Function | None:
+        return implementation if owned(a) else None
+
+    overload(operation, jit_options=STRICT, strict=False)(choose)

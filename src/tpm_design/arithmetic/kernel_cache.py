@@ -1,0 +1,75 @@
+"""Where compiled kernels are kept between runs.
+
+Numba recompiles a cached function when its own file changes, not when a formula it calls in another file
+does. So the cache folder is named by a hash of every source file of the package: any change gives a fresh
+folder. Numba reads its cache folder from the environment once, when it is imported; this module must
+therefore be imported before Numba and imports nothing of it.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from hashlib import blake2b
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from platformdirs import user_cache_dir
+
+PACKAGE = Path(__file__).resolve().parents[1]
+DAYS_KEPT = 30
+PREFIX = "kernels-"
+
+
+def source_hash(package: Path) -> str:
+    """Hash of the names and bytes of every ``*.py`` file below ``package``, and of Numba's version."""
+    digest = blake2b(digest_size=10)
+    with suppress(PackageNotFoundError):
+        digest.update(version("numba").encode())
+    digest.update(sys.implementation.cache_tag.encode() if sys.implementation.cache_tag else b"")
+    for source in sorted(package.rglob("*.py")):
+        text = source.read_bytes()
+        digest.update(f"\0{source.relative_to(package).as_posix()}\0{len(text)}\0".encode())
+        digest.update(text)
+    return digest.hexdigest()
+
+
+def usable(folder: Path) -> bool:
+    """Whether ``folder`` exists, after an attempt to create it, and can be written; marks it as used now."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK | os.X_OK)
+
+
+def remove_unused(parent: Path, now: float) -> None:
+    """Remove the kernel folders in ``parent`` that nobody has used for ``DAYS_KEPT`` days."""
+    with suppress(OSError):
+        for folder in parent.glob(f"{PREFIX}*"):
+            if now - folder.stat().st_mtime > DAYS_KEPT * 86400:
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+def use_kernel_cache(package: Path = PACKAGE) -> Path:
+    """Point Numba at the cache folder that belongs to the present source; returns the folder."""
+    name = PREFIX + source_hash(package)
+    parent = Path(user_cache_dir("tpm-design", appauthor=False))
+    folder = parent / name
+    if usable(folder):
+        remove_unused(parent, time.time())
+    else:
+        folder = Path(tempfile.gettempdir()) / f"tpm-design-{name}"
+        usable(folder)
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+    if (config := sys.modules.get("numba.core.config")) is not None:
+        config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+    return folder
+
+
+FOLDER = use_kernel_cache()

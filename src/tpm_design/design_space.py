@@ -1,0 +1,90 @@
+"""The unit cube that optimisers search, and the designs its points stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpm_design.problem import CENTRE, Design, Variable
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DesignSpace:
+    """Free quantities in order, and what is fixed. ``octants``: mode label → signs (±1, 0) of its octant,
+    for the quantities that follow it."""
+
+    variables: tuple[Variable, ...]
+    fixed: Mapping[str, float | str]
+    octants: Mapping[str, tuple[float, float, float]]
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """Number of values of each variable, 0 for a continuous one."""
+        return tuple(len(variable.values) for variable in self.variables)
+
+    def design(self, point: FloatArray) -> Design:
+        """The design (SI) at a point (n,) of the unit cube."""
+        design: dict[str, float | str] = dict(self.fixed)
+        for variable, coordinate in zip(self.variables, point, strict=True):
+            share = min(1.0, max(0.0, float(coordinate)))
+            if variable.values:
+                count = len(variable.values)
+                design[variable.name] = variable.values[min(count - 1, int(share * count))]
+            else:
+                design[variable.name] = variable.lower + share * (variable.upper - variable.lower)
+        return self._mirrored(design)
+
+    def point(self, design: Design) -> FloatArray:
+        """The unit-cube point (n,) of a design; discrete values at the centre of their interval."""
+        coordinates = []
+        for variable in self.variables:
+            value = design[variable.name]
+            if variable.values:
+                coordinates.append((variable.values.index(value) + 0.5) / len(variable.values))
+            else:
+                number = abs(float(value)) if variable.mirrored else float(value)
+                width = variable.upper - variable.lower
+                coordinates.append((number - variable.lower) / width if width > 0.0 else 0.0)
+        return np.clip(np.asarray(coordinates, dtype=np.float64), 0.0, 1.0)
+
+    def start(self) -> FloatArray:
+        """The point of every ``initial``, else of the middle of the range, else of the first value."""
+        design: dict[str, float | str] = {}
+        for variable in self.variables:
+            if variable.initial is not None:
+                design[variable.name] = variable.initial
+            elif variable.values:
+                design[variable.name] = variable.values[0]
+            else:
+                design[variable.name] = 0.5 * (variable.lower + variable.upper)
+        return self.point(design)
+
+    def holding_discrete(self, design: Design) -> DesignSpace:
+        """The space of the continuous variables, the discrete ones fixed at the design's values."""
+        chosen = {v.name: design[v.name] for v in self.variables if v.values}
+        return DesignSpace(
+            tuple(v for v in self.variables if not v.values), {**self.fixed, **chosen}, self.octants
+        )
+
+    def _mirrored(self, design: dict[str, float | str]) -> Design:
+        for variable in self.variables:
+            if variable.mirrored:
+                sign = self.octants[str(design["mode"])][CENTRE.index(variable.name)]
+                design[variable.name] = (sign or 1.0) * float(design[variable.name])
+        return design
+
+
+def octant_signs(modes: Mapping[str, Mapping[str, str]]) -> dict[str, tuple[float, float, float]]:
+    """Signs of each mode's octant; 0 where the mode has none."""
+    meaning = {"+": 1.0, "-": -1.0}
+    signs = {}
+    for label, fields in modes.items():
+        text = fields.get("octant", "any")
+        x, y, z = (meaning[sign] for sign in text) if text != "any" else (0.0, 0.0, 0.0)
+        signs[label] = (x, y, z)
+    return signs

@@ -1,0 +1,72 @@
+"""The equations a mechanism may give, as names to be implemented by type of geometry.
+
+Each is called inside compiled code with the mechanism's geometry and mode (named tuples of numbers)
+and a pose x, y, z, all of one kind of number: float, Interval or Dual. A mechanism's file implements
+them with ``@formula(name, Geometry)``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def leg_margins(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
+    """Metres, ≥ 0 inside the leg space of each limb: a tuple of all the bounds of reach."""
+    raise NotImplementedError
+
+
+def mode_margins(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
+    """Metres, ≥ 0 where the pose belongs to the working mode: side of the octant, joint limits."""
+    raise NotImplementedError
+
+
+def singularity_margins(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
+    """Signed determinants of unit rows, in [−1, 1], in the order of ``MechanismKind.determinants``."""
+    raise NotImplementedError
+
+
+def serial_margins(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
+    """Per limb, the dimensionless distance to a serial singularity, ≥ 0."""
+    raise NotImplementedError
+
+
+def velocity_map(geometry: Any, mode: Any, motor: Any, x: Any, y: Any, z: Any) -> Any:
+    """Rows of A (three triples) and the diagonal b of A ẋ = diag(b) q̇. ``motor``: 1 motors, 0 joints."""
+    raise NotImplementedError
+
+
+def actuators(geometry: Any, mode: Any, motor: Any, x: Any, y: Any, z: Any) -> Any:
+    """Actuator coordinates (rad or m), three of them. ``motor`` as in ``velocity_map``."""
+    raise NotImplementedError
+
+
+def closure(geometry: Any, motor: Any, q: Any, x: Any, y: Any, z: Any) -> Any:
+    """Three residuals that vanish at every pose where the limbs close for actuator coordinates ``q``, in
+    whichever working mode. They may vanish elsewhere too. ``motor`` as in ``velocity_map``; only x, y, z
+    may be other than floats."""
+    raise NotImplementedError
+
+
+def joint_angles(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
+    """Per limb, a tuple of its joint angles (rad)."""
+    raise NotImplementedError
+
+
+def joint_centres(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
+    """Per limb, the chain of joint centres (m) from the base: limbs × centres × 3."""
+    raise NotImplementedError
+
+
+def length_error_gains(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
+    """Per limb, the norm of the length errors' coefficients in a_i · dx = c_i · dε (a_i a row of A)."""
+    raise NotImplementedError
+
+
+def input_transmission(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
+    """Per limb, |a_i · t_i| of the unit row and the driven point's unit velocity, in [0, 1]."""
+    raise NotImplementedError
+
+
+def limb_clearance(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
+    """Least distance (m) between the surfaces of links of different limbs."""
+    raise NotImplementedError

@@ -1,0 +1,143 @@
+"""A mechanism with dimensions: what users call ``m``."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tpm_design.errors import ParameterError, did_you_mean
+from tpm_design.mechanisms import pointwise
+from tpm_design.mechanisms.base import MechanismKind
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A working mode: its label and its signs, a named tuple of ±1 (0: any) for the kernels."""
+
+    label: str
+    signs: Any
+
+
+@dataclass(frozen=True)
+class Mechanism(ABC):
+    """One machine. ``parameters``: name → SI value per limb; ``geometry``: the same for the kernels."""
+
+    kind: MechanismKind
+    parameters: Mapping[str, tuple[float, ...]]
+    geometry: Any
+
+    @abstractmethod
+    def mode_of(self, signs: Mapping[str, str]) -> Mode:
+        """The working mode named by sign strings, e.g. ``{"octant": "+++", "elbows": "+-+"}``."""
+
+    @abstractmethod
+    def reach_radius(self) -> float:
+        """Every reachable pose lies within this distance (m) of the origin."""
+
+    @abstractmethod
+    def total_link_length(self) -> float:
+        """Sum over the limbs of the moving links (m)."""
+
+    @abstractmethod
+    def fk(self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor") -> FloatArray:
+        """Every real assembly (K, 3) in metres for actuator coordinates ``q`` (3,), of all working modes
+        or of ``mode``, each confirmed by the inverse map; ``drive`` as in ``ik``."""
+
+    def ik(self, points: ArrayLike, mode: Mode, *, drive: str = "motor") -> FloatArray:
+        """Actuator coordinates (N, n) at ``points`` (N, 3) in metres; rows of NaN where the pose is
+        unreachable, outside the mode's octant or joint limits, or the coordinates are undefined.
+
+        Raises ParameterError on an unknown ``drive`` or points that are not (N, 3) finite numbers.
+        """
+        x, y, z = pointwise.columns(_poses(points))
+        out = np.empty((x.size, 3))
+        pointwise.actuators_row(self.geometry, mode.signs, self.motor_weight(drive), x, y, z, out)
+        out[~self._usable(x, y, z, mode)] = np.nan
+        return out
+
+    def jacobian(self, points: ArrayLike, mode: Mode, *, drive: str = "motor") -> FloatArray:
+        """J (N, 3, 3) of ẋ = J q̇ at ``points`` (N, 3); NaN where ``ik`` is NaN or J does not exist.
+
+        Raises ParameterError as ``ik`` does.
+        """
+        x, y, z = pointwise.columns(_poses(points))
+        out = np.empty((x.size, 3, 3))
+        pointwise.jacobian_row(self.geometry, mode.signs, self.motor_weight(drive), x, y, z, out)
+        out[~self._usable(x, y, z, mode) | ~np.isfinite(out).all(axis=(1, 2))] = np.nan
+        return out
+
+    def margins(self, points: ArrayLike, mode: Mode) -> dict[str, FloatArray]:
+        """Margins (N,) at ``points`` (N, 3).
+
+        "reach": metres, ≥ 0 where the pose belongs to the mode's workspace (the leg margin; outside the
+        octant or the joint limits the negative distance to them where that is worse). "serial" and the
+        signed determinants of unit rows: NaN where unreachable, 0 where their rows are undefined.
+        """
+        x, y, z = pointwise.columns(_poses(points))
+        legs, side, determinants = self._margins(x, y, z, mode)
+        reach = np.where(side < 0.0, np.minimum(legs, side), legs)
+        reach[np.isnan(legs) | np.isnan(side)] = 0.0
+        serial = np.empty(x.size)
+        pointwise.serial_row(self.geometry, mode.signs, x, y, z, serial)
+        serial[~np.isfinite(serial)] = 0.0
+        determinants[np.isnan(determinants)] = 0.0
+        outside = reach < 0.0
+        serial[outside] = np.nan
+        determinants[:, outside] = np.nan
+        named = dict(zip(self.kind.determinants, determinants, strict=True))
+        return {"reach": reach, "serial": serial, **named}
+
+    def determinants(self, points: ArrayLike, mode: Mode) -> FloatArray:
+        """Signed determinants (D, N) at ``points`` (N, 3), reachable or not; 0 where undefined."""
+        x, y, z = pointwise.columns(_poses(points))
+        out = np.empty((len(self.kind.determinants), x.size))
+        pointwise.singularity_row(self.geometry, mode.signs, x, y, z, out)
+        out[np.isnan(out)] = 0.0
+        return out
+
+    def joint_centres(self, pose: ArrayLike, mode: Mode) -> FloatArray:
+        """Joint centres (limbs, centres, 3) in metres at one pose, from the base along each limb."""
+        x, y, z = (float(value) for value in _poses(pose)[0])
+        return np.asarray(pointwise.centres_at(self.geometry, mode.signs, x, y, z))
+
+    def motor_weight(self, drive: str) -> float:
+        """1.0 for motors, 0.0 for joints; raises ParameterError on another word."""
+        if drive not in self.kind.drives:
+            raise ParameterError(f"Unknown drive {drive!r}.", remedy=did_you_mean(drive, self.kind.drives))
+        return 1.0 if drive == "motor" else 0.0
+
+    def _margins(
+        self, x: FloatArray, y: FloatArray, z: FloatArray, mode: Mode
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        legs, side = np.empty(x.size), np.empty(x.size)
+        determinants = np.empty((len(self.kind.determinants), x.size))
+        pointwise.reach_row(self.geometry, mode.signs, x, y, z, legs, side)
+        pointwise.singularity_row(self.geometry, mode.signs, x, y, z, determinants)
+        return legs, side, determinants
+
+    def _usable(self, x: FloatArray, y: FloatArray, z: FloatArray, mode: Mode) -> NDArray[np.bool_]:
+        legs, side, _ = self._margins(x, y, z, mode)
+        # coordinate planes belong to no octant: strictly inside
+        return (legs >= 0.0) & (side > 0.0)
+
+
+def _poses(points: ArrayLike) -> FloatArray:
+    """Points as (N, 3) floats; raises ParameterError otherwise."""
+    try:
+        array = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError("Poses must be numbers.", remedy="Give an (N, 3) array in metres.") from None
+    if array.ndim == 1 and array.size == 3:
+        array = array.reshape(1, 3)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ParameterError(f"Poses have shape {array.shape}.", remedy="Give an (N, 3) array in metres.")
+    if not np.isfinite(array).all():
+        raise ParameterError("A pose is not finite.", remedy="Remove NaN and infinite coordinates.")
+    return array

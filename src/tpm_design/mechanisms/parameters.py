@@ -1,0 +1,95 @@
+"""Design parameters and sign strings, checked against what a mechanism declares."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from tpm_design.errors import ParameterError, did_you_mean
+from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter
+
+
+def limb_values(
+    kind: MechanismKind, parameters: Mapping[str, float | Sequence[float]]
+) -> dict[str, tuple[float, ...]]:
+    """Each parameter's SI value per limb, from ``f``, ``f=(…)`` or ``f1``, ``f2``, ``f3``.
+
+    Raises ParameterError on an unknown, missing, doubly given or impossible value.
+    """
+    for name in parameters:
+        if kind.parameter(name) is None:
+            raise ParameterError(
+                f"{kind.name} has no parameter {name!r}.", remedy=did_you_mean(name, kind.parameter_names())
+            )
+    return {parameter.name: _values(kind, parameter, parameters) for parameter in kind.parameters}
+
+
+def _values(
+    kind: MechanismKind, parameter: Parameter, given: Mapping[str, float | Sequence[float]]
+) -> tuple[float, ...]:
+    count = kind.limb_count if parameter.per_limb else 1
+    single = [f"{parameter.name}{limb + 1}" for limb in range(count)] if parameter.per_limb else []
+    named = [name for name in single if name in given]
+    if parameter.name in given:
+        if named:
+            raise ParameterError(
+                f"{kind.name}: {parameter.name!r} and {named[0]!r} are both given.",
+                remedy=f"Give {parameter.name!r} for all limbs, or {', '.join(single)} one each.",
+            )
+        value = given[parameter.name]
+        values = (value,) * count if isinstance(value, int | float) else tuple(value)
+        if len(values) != count:
+            raise ParameterError(
+                f"{kind.name}: {parameter.name!r} has {len(values)} values for {count} limbs."
+            )
+    else:
+        missing = [name for name in (single or [parameter.name]) if name not in given]
+        if missing:
+            raise ParameterError(
+                f"{kind.name}: no value for {missing[0] if named else parameter.name!r}.",
+                remedy=f"It is the {parameter.description}.",
+            )
+        values = tuple(given[name] for name in single)
+    return tuple(checked_value(kind, parameter, value) for value in values)
+
+
+def checked_value(kind: MechanismKind, parameter: Parameter, value: object) -> float:
+    """``value`` as a float of the parameter's domain; raises ParameterError otherwise."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ParameterError(f"{kind.name}: {parameter.name} = {value!r} is not a finite number.")
+    allowed = {
+        "positive": value > 0.0,
+        "non-negative": value >= 0.0,
+        "non-zero": value != 0.0,
+        "any": True,
+    }[parameter.domain]
+    if not allowed:
+        raise ParameterError(
+            f"{kind.name}: {parameter.name} = {value!r} is not {parameter.domain}.",
+            remedy=f"It is the {parameter.description}.",
+        )
+    return float(value)
+
+
+def mode_signs(kind: MechanismKind, signs: Mapping[str, str]) -> dict[str, tuple[float, ...]]:
+    """Each mode field as a tuple of ±1.0, or of 0.0 for ``any``; raises ParameterError otherwise."""
+    known = [field.name for field in kind.mode_fields]
+    for name in signs:
+        if name not in known:
+            raise ParameterError(
+                f"{kind.name} has no mode field {name!r}.", remedy=did_you_mean(name, known)
+            )
+    return {field.name: _field_signs(kind, field, signs) for field in kind.mode_fields}
+
+
+def _field_signs(kind: MechanismKind, field: ModeField, signs: Mapping[str, str]) -> tuple[float, ...]:
+    text = signs.get(field.name)
+    if field.any_allowed and text == "any":
+        return (0.0,) * field.length
+    if not isinstance(text, str) or len(text) != field.length or set(text) - {"+", "-"}:
+        choice = ' or "any"' if field.any_allowed else ""
+        raise ParameterError(
+            f"{kind.name}: {field.name} is {text!r}.",
+            remedy=f"Give {field.length} signs, such as \"{'+' * field.length}\"{choice}: {field.description}.",
+        )
+    return tuple(1.0 if sign == "+" else -1.0 for sign in text)

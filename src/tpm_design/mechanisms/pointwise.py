@@ -1,0 +1,87 @@
+"""Compiled loops over arrays of poses. Arrays x, y, z are (N,) in metres."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from tpm_design.arithmetic import FAST_MATH
+from tpm_design.mechanisms import equations
+from tpm_design.mechanisms.velocity import jacobian
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
+def reach_row(geometry, mode, x, y, z, legs, side):  # type: ignore[no-untyped-def]
+    """Least leg margin and least mode margin (N,), written in place."""
+    for n in range(x.size):
+        leg_margins = equations.leg_margins(geometry, mode, x[n], y[n], z[n])
+        least = leg_margins[0]
+        for margin in leg_margins:
+            least = min(least, margin)
+        legs[n] = least
+    # a loop of its own: what does not depend on the pose in these margins is then decided once
+    for n in range(x.size):
+        mode_margins = equations.mode_margins(geometry, mode, x[n], y[n], z[n])
+        least = mode_margins[0]
+        for margin in mode_margins:
+            least = min(least, margin)
+        side[n] = least
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
+def singularity_row(geometry, mode, x, y, z, determinants):  # type: ignore[no-untyped-def]
+    """Signed determinants (D, N), written in place."""
+    for n in range(x.size):
+        values = equations.singularity_margins(geometry, mode, x[n], y[n], z[n])
+        for k in range(len(values)):
+            determinants[k, n] = values[k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def least_margin(margins):  # type: ignore[no-untyped-def]
+    """Least of a tuple of margins; NaN counts as −inf, so that an undefined pose is outside."""
+    least = math.inf
+    for margin in margins:
+        least = min(least, margin) if margin == margin else -math.inf  # noqa: PLR0124
+    return least
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def serial_row(geometry, mode, x, y, z, out):  # type: ignore[no-untyped-def]
+    """Least serial margin (N,), written in place."""
+    for n in range(x.size):
+        out[n] = least_margin(equations.serial_margins(geometry, mode, x[n], y[n], z[n]))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def actuators_row(geometry, mode, motor, x, y, z, out):  # type: ignore[no-untyped-def]
+    """Actuator coordinates (N, 3), written in place."""
+    for n in range(x.size):
+        values = equations.actuators(geometry, mode, motor, x[n], y[n], z[n])
+        for k in range(3):
+            out[n, k] = values[k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def jacobian_row(geometry, mode, motor, x, y, z, out):  # type: ignore[no-untyped-def]
+    """J (N, 3, 3), written in place."""
+    for n in range(x.size):
+        rows, b = equations.velocity_map(geometry, mode, motor, x[n], y[n], z[n])
+        values = jacobian(rows, b)
+        for i in range(3):
+            for j in range(3):
+                out[n, i, j] = values[i][j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def centres_at(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """Joint centres at one pose, nested tuples as the mechanism gives them."""
+    return equations.joint_centres(geometry, mode, x, y, z)
+
+
+def columns(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x, y, z of an (N, 3) array, contiguous."""
+    table = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 3).T)
+    return table[0], table[1], table[2]

@@ -1,0 +1,62 @@
+"""Distances between straight links."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+Point = tuple[float, float, float]
+
+
+@njit(error_model="numpy")
+def _dot(u, v):  # type: ignore[no-untyped-def]
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+@njit(error_model="numpy")
+def _clamp(value):  # type: ignore[no-untyped-def]
+    return min(1.0, max(0.0, value))
+
+
+@njit(error_model="numpy")
+def segment_distance(a, b, c, d):  # type: ignore[no-untyped-def]
+    """Distance (m) between segments ab and cd.
+
+    The squared distance is a convex quadratic of the two parameters on the unit square: the interior
+    minimum if it lies inside, else the best of the four edges.
+    """
+    u = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+    v = (d[0] - c[0], d[1] - c[1], d[2] - c[2])
+    w = (a[0] - c[0], a[1] - c[1], a[2] - c[2])
+    uu, uv, vv, uw, vw = _dot(u, u), _dot(u, v), _dot(v, v), _dot(u, w), _dot(v, w)
+    determinant = uu * vv - uv * uv
+    least = math.inf
+    if determinant > 1e-14 * uu * vv:
+        s = (uv * vw - vv * uw) / determinant
+        t = (uu * vw - uv * uw) / determinant
+        if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
+            least = _square(w, u, v, s, t)
+    for end in (0.0, 1.0):
+        t = _clamp((vw + end * uv) / vv) if vv > 0.0 else 0.0
+        least = min(least, _square(w, u, v, end, t))
+        s = _clamp((end * uv - uw) / uu) if uu > 0.0 else 0.0
+        least = min(least, _square(w, u, v, s, end))
+    return math.sqrt(max(0.0, least))
+
+
+@njit(error_model="numpy")
+def _square(w, u, v, s, t):  # type: ignore[no-untyped-def]
+    x = w[0] + s * u[0] - t * v[0]
+    y = w[1] + s * u[1] - t * v[1]
+    z = w[2] + s * u[2] - t * v[2]
+    return x * x + y * y + z * z
+
+
+@njit(error_model="numpy")
+def chain_distance(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
+    """Distance (m) between the two-link chains a0–a1–a2 and b0–b1–b2."""
+    return min(
+        min(segment_distance(a0, a1, b0, b1), segment_distance(a0, a1, b1, b2)),
+        min(segment_distance(a1, a2, b0, b1), segment_distance(a1, a2, b1, b2)),
+    )

@@ -1,0 +1,487 @@
+"""LaMaViP 3-URU: three universal–revolute–universal limbs, motors on the base.
+
+Source: R. Di Gregorio, "A Novel 3-URU Architecture with Actuators on the Base: Kinematics and
+Singularity Analysis", Robotics 9(3), 60, 2020. Equation numbers in brackets are that paper's; eq. (34)
+is used with its indices corrected.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tpm_design.arithmetic import (
+    arctangent2,
+    cosine,
+    direction_cosine,
+    formula,
+    lesser,
+    magnitude,
+    pos,
+    root,
+    sine,
+    sqr,
+)
+from tpm_design.arithmetic.algebra import determinant
+from tpm_design.mechanisms import equations
+from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
+from tpm_design.mechanisms.mechanism import FloatArray, Mechanism, Mode
+from tpm_design.mechanisms.parameters import limb_values, mode_signs
+from tpm_design.mechanisms.segments import chain_distance
+
+Triple = tuple[float, float, float]
+Quadruple = tuple[float, float, float, float]
+
+
+class UruGeometry(NamedTuple):
+    """Dimensions of the three limbs (m; gear ratios dimensionless) and the limits of their joints.
+
+    ``limit_cosine``, ``limit_sine``: middle of the range of joints θ_i1 … θ_i4, ``limit_bound``: cosine of
+    its half width, so that a joint is inside its range where cos(θ − middle) ≥ bound.
+    """
+
+    base: Triple
+    platform: Triple
+    proximal: Triple
+    distal: Triple
+    gear: Triple
+    limited: float
+    limit_cosine: Quadruple
+    limit_sine: Quadruple
+    limit_bound: Quadruple
+    link_radius: float
+
+
+class UruSigns(NamedTuple):
+    """A working mode: sides of the coordinate planes (0: any) and elbows, each +1 or −1."""
+
+    octant: Triple
+    elbows: Triple
+
+
+def limb_chain(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
+    """Planar chain of one limb in its plane (e_i, h_i), see the implementation for what it returns."""
+    raise NotImplementedError
+
+
+@formula(limb_chain, UruGeometry)
+def _limb_chain(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
+    """(a, c, γ, β, ρ², α): v_i = a e_i + c h_i (unit), γ_i = f_i sin θ_i3, inverse position (A1)–(A2)
+    without inverse trigonometry."""
+    f = geometry.proximal[limb]
+    r = geometry.distal[limb]
+    alpha = p + (geometry.platform[limb] - geometry.base[limb])
+    beta_squared = sqr(pj) + sqr(pk)
+    beta = root(beta_squared)
+    rho_squared = sqr(alpha) + beta_squared
+    inverse = 1.0 / rho_squared
+    share = 0.5 + 0.5 * (sqr(r) - sqr(f)) * inverse
+    bend = (0.5 * elbow) * root(pos(sqr(f + r) * inverse - 1.0) * pos(1.0 - sqr(f - r) * inverse))
+    a = (alpha * share + beta * bend) / r
+    c = (beta * share - alpha * bend) / r
+    gamma = -(rho_squared * bend) / r
+    return a, c, gamma, beta, rho_squared, alpha
+
+
+def limb_margins(geometry, limb, p, pj, pk):  # type: ignore[no-untyped-def]
+    """Leg space (29) of one limb in metres, see the implementation."""
+    raise NotImplementedError
+
+
+@formula(limb_margins, UruGeometry)
+def _limb_margins(geometry, limb, p, pj, pk):  # type: ignore[no-untyped-def]
+    """(f_i + r_i − ρ_i, ρ_i − |f_i − r_i|)."""
+    f = geometry.proximal[limb]
+    r = geometry.distal[limb]
+    alpha = p + (geometry.platform[limb] - geometry.base[limb])
+    rho = root(sqr(alpha) + (sqr(pj) + sqr(pk)))
+    return f + r - rho, rho - magnitude(f - r)
+
+
+@formula(equations.leg_margins, UruGeometry)
+def _leg_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """(29), outer and inner bound of each limb."""
+    outer1, inner1 = limb_margins(geometry, 0, x, y, z)
+    outer2, inner2 = limb_margins(geometry, 1, y, z, x)
+    outer3, inner3 = limb_margins(geometry, 2, z, x, y)
+    return outer1, inner1, outer2, inner2, outer3, inner3
+
+
+def limit_margin(geometry, joint, cosine, sine):  # type: ignore[no-untyped-def]
+    """Signed distance to the limits of one joint, see the implementation."""
+    raise NotImplementedError
+
+
+@formula(limit_margin, UruGeometry)
+def _limit_margin(geometry, joint, cosine, sine):  # type: ignore[no-untyped-def]
+    """cos(θ − middle) − cos(half width), ≥ 0 inside the joint's range."""
+    return (
+        cosine * geometry.limit_cosine[joint]
+        + sine * geometry.limit_sine[joint]
+        - geometry.limit_bound[joint]
+    )
+
+
+def limb_limit_margin(geometry, limb, elbow, p, pj, pk, cosine_first, sine_first):  # type: ignore[no-untyped-def]
+    """Joint limits of one limb in metres, see the implementation."""
+    raise NotImplementedError
+
+
+@formula(limb_limit_margin, UruGeometry)
+def _limb_limit_margin(geometry, limb, elbow, p, pj, pk, cosine_first, sine_first):  # type: ignore[no-untyped-def]
+    """Least limit margin of θ_i1 … θ_i4 times f_i; θ_i4 = −(θ_i2 + θ_i3) keeps the platform parallel."""
+    a, c, gamma, beta, rho_squared, alpha = limb_chain(geometry, limb, elbow, p, pj, pk)
+    f = geometry.proximal[limb]
+    r = geometry.distal[limb]
+    first = limit_margin(geometry, 0, cosine_first, sine_first)
+    second = limit_margin(geometry, 1, (alpha - r * a) / f, (beta - r * c) / f)
+    third = limit_margin(geometry, 2, (rho_squared - sqr(f) - sqr(r)) / (2.0 * f * r), gamma / f)
+    fourth = limit_margin(geometry, 3, a, -c)
+    return f * lesser(lesser(first, second), lesser(third, fourth))
+
+
+def octant_margin(geometry, sign, coordinate):  # type: ignore[no-untyped-def]
+    """Signed distance to a coordinate plane, see the implementation."""
+    raise NotImplementedError
+
+
+@formula(octant_margin, UruGeometry)
+def _octant_margin(geometry, sign, coordinate):  # type: ignore[no-untyped-def]
+    """Positive on the octant's side; 1 m everywhere for sign 0, any side."""
+    return sign * coordinate + (1.0 - sign * sign)
+
+
+@formula(equations.mode_margins, UruGeometry)
+def _mode_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """Signed distance to each plane of the octant, then the joint limits of each limb."""
+    side1 = octant_margin(geometry, mode.octant[0], x)
+    side2 = octant_margin(geometry, mode.octant[1], y)
+    side3 = octant_margin(geometry, mode.octant[2], z)
+    if geometry.limited == 0.0:
+        return side1, side2, side3, side1, side2, side3
+    k1, k2, k3 = mode.elbows
+    # g_i = cos θ_i1 · … + sin θ_i1 · …: the paper's phase references differ from limb to limb
+    limb1 = limb_limit_margin(geometry, 0, k1, x, y, z, -direction_cosine(z, y), direction_cosine(y, z))
+    limb2 = limb_limit_margin(geometry, 1, k2, y, z, x, -direction_cosine(z, x), -direction_cosine(x, z))
+    limb3 = limb_limit_margin(geometry, 2, k3, z, x, y, -direction_cosine(y, x), direction_cosine(x, y))
+    return side1, side2, side3, limb1, limb2, limb3
+
+
+def limb_rows(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
+    """Unit rows of V and W of one limb along e_i, e_j, e_k, see the implementation."""
+    raise NotImplementedError
+
+
+@formula(limb_rows, UruGeometry)
+def _limb_rows(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
+    """v_i and w_i/|w_i|. With w_i = v_i + (k_i γ_i/β_i) g_i and g_i ⟂ v_i the unit row is
+    cos ψ v_i + sin ψ g_i, tan ψ = k_i γ_i/β_i: no pole on the axis e_i."""
+    a, c, gamma, beta, rho_squared, alpha = limb_chain(geometry, limb, elbow, p, pj, pk)
+    hj = direction_cosine(pj, pk)
+    hk = direction_cosine(pk, pj)
+    lever = geometry.gear[limb] * gamma
+    toward = direction_cosine(beta, lever)
+    across = direction_cosine(lever, beta)
+    v = (a, c * hj, c * hk)
+    w = (toward * a, toward * (c * hj) - across * hk, toward * (c * hk) + across * hj)
+    return v, w
+
+
+@formula(equations.singularity_margins, UruGeometry)
+def _singularity_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """det V (20), det W/∏|w_i| (36), det H (17)."""
+    k1, k2, k3 = mode.elbows
+    (v11, v12, v13), (w11, w12, w13) = limb_rows(geometry, 0, k1, x, y, z)
+    (v22, v23, v21), (w22, w23, w21) = limb_rows(geometry, 1, k2, y, z, x)
+    (v33, v31, v32), (w33, w31, w32) = limb_rows(geometry, 2, k3, z, x, y)
+    translation = determinant(v11, v12, v13, v21, v22, v23, v31, v32, v33)
+    actuation = determinant(w11, w12, w13, w21, w22, w23, w31, w32, w33)
+    rotation = 2.0 * direction_cosine(x, y) * direction_cosine(y, z) * direction_cosine(z, x)
+    return translation, actuation, rotation
+
+
+@formula(equations.serial_margins, UruGeometry)
+def _serial_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """|sin θ_i3| (27)."""
+    k1, k2, k3 = mode.elbows
+    _, _, gamma1, _, _, _ = limb_chain(geometry, 0, k1, x, y, z)
+    _, _, gamma2, _, _, _ = limb_chain(geometry, 1, k2, y, z, x)
+    _, _, gamma3, _, _, _ = limb_chain(geometry, 2, k3, z, x, y)
+    f1, f2, f3 = geometry.proximal
+    return magnitude(gamma1 / f1), magnitude(gamma2 / f2), magnitude(gamma3 / f3)
+
+
+def limb_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-untyped-def]
+    """Row of A along e_i, e_j, e_k and entry of b of one limb, see the implementation."""
+    raise NotImplementedError
+
+
+@formula(limb_velocity, UruGeometry)
+def _limb_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-untyped-def]
+    """Joints: v_i and γ_i (18). Motors: w_i = v_i + (k_i γ_i/β_i) g_i and k_i γ_i (19)."""
+    a, c, gamma, beta, rho_squared, alpha = limb_chain(geometry, limb, elbow, p, pj, pk)
+    hj = direction_cosine(pj, pk)
+    hk = direction_cosine(pk, pj)
+    gear = geometry.gear[limb]
+    swing = (motor * gear) * gamma / beta
+    row = (a, c * hj - swing * hk, c * hk + swing * hj)
+    return row, (1.0 + motor * (gear - 1.0)) * gamma
+
+
+@formula(equations.velocity_map, UruGeometry)
+def _velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
+    """V ṗ = diag(γ) θ̇_2 (18), W ṗ = diag(k γ) θ̇_M (19)."""
+    k1, k2, k3 = mode.elbows
+    (a11, a12, a13), b1 = limb_velocity(geometry, 0, k1, motor, x, y, z)
+    (a22, a23, a21), b2 = limb_velocity(geometry, 1, k2, motor, y, z, x)
+    (a33, a31, a32), b3 = limb_velocity(geometry, 2, k3, motor, z, x, y)
+    return ((a11, a12, a13), (a21, a22, a23), (a31, a32, a33)), (b1, b2, b3)
+
+
+def limb_angles(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
+    """θ_i2, θ_i3 and θ_i4 of one limb (rad), see the implementation."""
+    raise NotImplementedError
+
+
+@formula(limb_angles, UruGeometry)
+def _limb_angles(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
+    """(A1)–(A2): θ_i2 unwrapped in (−π, 2π), θ_i3 = ∓ the angle at the elbow, θ_i4 = −(θ_i2 + θ_i3)."""
+    f = geometry.proximal[limb]
+    r = geometry.distal[limb]
+    alpha = p + (geometry.platform[limb] - geometry.base[limb])
+    beta_squared = pj * pj + pk * pk
+    rho_squared = alpha * alpha + beta_squared
+    if rho_squared == 0.0:
+        return math.nan, math.nan, math.nan
+    at_base = (rho_squared + f * f - r * r) / (2.0 * f * math.sqrt(rho_squared))
+    at_elbow = (rho_squared - f * f - r * r) / (2.0 * f * r)
+    second = math.atan2(math.sqrt(beta_squared), alpha) + elbow * math.acos(min(1.0, max(-1.0, at_base)))
+    third = -elbow * math.acos(min(1.0, max(-1.0, at_elbow)))
+    return second, third, -(second + third)
+
+
+@formula(equations.joint_angles, UruGeometry)
+def _joint_angles(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """θ_i1 … θ_i5 of each limb; θ_i5 = −θ_i1 keeps the platform parallel."""
+    k1, k2, k3 = mode.elbows
+    first1 = math.atan2(y, -z) if y != 0.0 or z != 0.0 else math.nan
+    first2 = math.atan2(-x, -z) if z != 0.0 or x != 0.0 else math.nan
+    first3 = math.atan2(x, -y) if x != 0.0 or y != 0.0 else math.nan
+    second1, third1, fourth1 = limb_angles(geometry, 0, k1, x, y, z)
+    second2, third2, fourth2 = limb_angles(geometry, 1, k2, y, z, x)
+    second3, third3, fourth3 = limb_angles(geometry, 2, k3, z, x, y)
+    return (
+        (first1, second1, third1, fourth1, -first1),
+        (first2, second2, third2, fourth2, -first2),
+        (first3, second3, third3, fourth3, -first3),
+    )
+
+
+@formula(equations.actuators, UruGeometry)
+def _actuators(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
+    """Joints: θ_i2. Motors: θ_iM = θ_i2/k_i + θ_i1 (11), the encoder's zero taken as 0."""
+    limb1, limb2, limb3 = equations.joint_angles(geometry, mode, x, y, z)
+    if motor == 0.0:
+        return limb1[1], limb2[1], limb3[1]
+    k1, k2, k3 = geometry.gear
+    return limb1[1] / k1 + limb1[0], limb2[1] / k2 + limb2[0], limb3[1] / k3 + limb3[0]
+
+
+def limb_closure(geometry, limb, motor, q, first, p, pj, pk):  # type: ignore[no-untyped-def]
+    """Residual of the loop closure of one limb, see the implementation."""
+    raise NotImplementedError
+
+
+@formula(limb_closure, UruGeometry)
+def _limb_closure(geometry, limb, motor, q, first, p, pj, pk):  # type: ignore[no-untyped-def]
+    """(α_i − f_i cos θ_i2)² + (β_i − f_i sin θ_i2)² − r_i², with θ_i2 the actuator itself or, driven by
+    the motors, k_i (θ_iM − θ_i1) (11)."""
+    f = geometry.proximal[limb]
+    alpha = p + (geometry.platform[limb] - geometry.base[limb])
+    beta = root(sqr(pj) + sqr(pk))
+    second = (motor * geometry.gear[limb]) * (q - first) + (1.0 - motor) * q
+    return sqr(alpha - f * cosine(second)) + sqr(beta - f * sine(second)) - sqr(geometry.distal[limb])
+
+
+@formula(equations.closure, UruGeometry)
+def _closure(geometry, motor, q, x, y, z):  # type: ignore[no-untyped-def]
+    """For poses inside one octant, where θ_i1 keeps to one quadrant."""
+    return (
+        limb_closure(geometry, 0, motor, q[0], arctangent2(y, -z), x, y, z),
+        limb_closure(geometry, 1, motor, q[1], arctangent2(-x, -z), y, z, x),
+        limb_closure(geometry, 2, motor, q[2], arctangent2(x, -y), z, x, y),
+    )
+
+
+@formula(equations.joint_centres, UruGeometry)
+def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """A_i = d_b e_i, B_i = p + d_p e_i and C_i = B_i − r_i v_i of each limb."""
+    k1, k2, k3 = mode.elbows
+    (v11, v12, v13), _ = limb_rows(geometry, 0, k1, x, y, z)
+    (v22, v23, v21), _ = limb_rows(geometry, 1, k2, y, z, x)
+    (v33, v31, v32), _ = limb_rows(geometry, 2, k3, z, x, y)
+    b1, b2, b3 = geometry.base
+    p1, p2, p3 = geometry.platform
+    r1, r2, r3 = geometry.distal
+    return (
+        ((b1, 0.0, 0.0), (x + p1 - r1 * v11, y - r1 * v12, z - r1 * v13), (x + p1, y, z)),
+        ((0.0, b2, 0.0), (x - r2 * v21, y + p2 - r2 * v22, z - r2 * v23), (x, y + p2, z)),
+        ((0.0, 0.0, b3), (x - r3 * v31, y - r3 * v32, z + p3 - r3 * v33), (x, y, z + p3)),
+    )
+
+
+def limb_error_gain(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
+    """Norm of one limb's length-error coefficients, see the implementation."""
+    raise NotImplementedError
+
+
+@formula(limb_error_gain, UruGeometry)
+def _limb_error_gain(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
+    """Loop closure with locked actuators: w_i·dx = −(v_i·e_i)(dd_p − dd_b) + (v_i·u_i) df + dr, where
+    v_i·u_i = cos θ_i3."""
+    a, c, gamma, beta, rho_squared, alpha = limb_chain(geometry, limb, elbow, p, pj, pk)
+    f = geometry.proximal[limb]
+    r = geometry.distal[limb]
+    bend = (rho_squared - sqr(f) - sqr(r)) / (2.0 * f * r)
+    return root(2.0 * sqr(a) + sqr(bend) + 1.0)
+
+
+@formula(equations.length_error_gains, UruGeometry)
+def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """For errors of d_b, d_p, f, r of each limb by itself."""
+    k1, k2, k3 = mode.elbows
+    return (
+        limb_error_gain(geometry, 0, k1, x, y, z),
+        limb_error_gain(geometry, 1, k2, y, z, x),
+        limb_error_gain(geometry, 2, k3, z, x, y),
+    )
+
+
+@formula(equations.input_transmission, UruGeometry)
+def _input_transmission(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """Driven at the joints, the elbow moves across the proximal link: |v_i · t_i| = |sin θ_i3|."""
+    return equations.serial_margins(geometry, mode, x, y, z)
+
+
+@formula(equations.limb_clearance, UruGeometry)
+def _limb_clearance(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """Links A_iC_i and C_iB_i as capsules of the link radius, limbs taken in pairs."""
+    (a1, c1, b1), (a2, c2, b2), (a3, c3, b3) = equations.joint_centres(geometry, mode, x, y, z)
+    first = chain_distance(a1, c1, b1, a2, c2, b2)
+    second = chain_distance(a2, c2, b2, a3, c3, b3)
+    third = chain_distance(a3, c3, b3, a1, c1, b1)
+    return min(first, min(second, third)) - 2.0 * geometry.link_radius
+
+
+@dataclass(frozen=True)
+class Uru(Mechanism):
+    """A LaMaViP 3-URU with dimensions. Pose: (x, y, z) of the platform's point P."""
+
+    geometry: UruGeometry
+
+    def mode(self, *, octant: str, elbows: str) -> Mode:
+        """The working mode on the given sides of the coordinate planes (``"any"``: all octants) with the
+        given elbows; elbow + has sin θ_i3 < 0. Raises ParameterError on anything but three signs."""
+        return self.mode_of({"octant": octant, "elbows": elbows})
+
+    def mode_of(self, signs: Mapping[str, str]) -> Mode:
+        values = mode_signs(self.kind, signs)
+        label = " ".join(signs[field.name] for field in self.kind.mode_fields)
+        return Mode(label, UruSigns(octant=values["octant"], elbows=values["elbows"]))
+
+    def reach_radius(self) -> float:
+        g = self.geometry
+        return min(
+            f + r + abs(p - b) for f, r, p, b in zip(g.proximal, g.distal, g.platform, g.base, strict=True)
+        )
+
+    def total_link_length(self) -> float:
+        return sum(self.geometry.proximal) + sum(self.geometry.distal)
+
+    def fk(self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor") -> FloatArray:
+        """Every real assembly (K, 3)."""
+        self.motor_weight(drive)
+        return np.empty((0, 3))
+
+
+def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str, Any]) -> Uru:
+    """A 3-URU from SI values: db, dp, f, r (m), k, each one number or three; limits as declared."""
+    values = limb_values(KIND, parameters)
+    ranges = [limits.get(f"theta{joint}") for joint in (1, 2, 3, 4)]
+    spans = [(-math.pi, math.pi) if r is None else (float(r[0]), float(r[1])) for r in ranges]
+    middles = [0.5 * (low + high) for low, high in spans]
+    halves = [min(math.pi, 0.5 * (high - low)) for low, high in spans]
+    geometry = UruGeometry(
+        base=values["db"],
+        platform=values["dp"],
+        proximal=values["f"],
+        distal=values["r"],
+        gear=values["k"],
+        limited=0.0 if all(r is None for r in ranges) else 1.0,
+        limit_cosine=tuple(math.cos(m) for m in middles),
+        limit_sine=tuple(math.sin(m) for m in middles),
+        limit_bound=tuple(
+            -2.0 if r is None else math.cos(h) for r, h in zip(ranges, halves, strict=True)
+        ),
+        link_radius=float(limits.get("link_radius", 0.0)),
+    )
+    return Uru(kind=KIND, parameters=values, geometry=geometry)
+
+
+def farthest_reach(ranges: Mapping[str, tuple[float, float]]) -> float:
+    """Largest f + r + |d_p − d_b| that the ranges allow (m)."""
+
+    def span(name: str) -> tuple[float, float]:
+        found = [ranges[key] for key in (name, f"{name}1", f"{name}2", f"{name}3") if key in ranges]
+        return min(low for low, _ in found), max(high for _, high in found)
+
+    base, platform = span("db"), span("dp")
+    offset = max(abs(platform[1] - base[0]), abs(platform[0] - base[1]))
+    return span("f")[1] + span("r")[1] + offset
+
+
+KIND = MechanismKind(
+    name="uru",
+    title="LaMaViP 3-URU",
+    source=(
+        "R. Di Gregorio, A Novel 3-URU Architecture with Actuators on the Base: Kinematics and "
+        "Singularity Analysis, Robotics 9(3), 60, 2020"
+    ),
+    parameters=(
+        Parameter("db", "d_b", "length", "non-negative", "distance of the base joints A_i from the origin O"),
+        Parameter("dp", "d_p", "length", "non-negative", "distance of the platform joints B_i from its point P"),
+        Parameter("f", "f_i", "length", "positive", "proximal link A_iC_i"),
+        Parameter("r", "r_i", "length", "positive", "distal link C_iB_i"),
+        Parameter("k", "k_i", "ratio", "non-zero", "gear ratio of the bevel gearbox, either sign"),
+    ),
+    pose=("x", "y", "z"),
+    actuator_unit="rad",
+    drives=("motor", "joint"),
+    mode_fields=(
+        ModeField("octant", 3, "sides of the planes x = 0, y = 0, z = 0", any_allowed=True),
+        ModeField("elbows", 3, "elbow of each limb; + has sin θ_i3 < 0"),
+    ),
+    limits=(
+        Limit("theta1", "angle", "range", "first base joint θ_i1"),
+        Limit("theta2", "angle", "range", "actuated joint θ_i2"),
+        Limit("theta3", "angle", "range", "elbow θ_i3"),
+        Limit("theta4", "angle", "range", "platform joint θ_i4 = −(θ_i2 + θ_i3)"),
+        Limit("link_radius", "length", "number", "radius of every link, for clearance"),
+    ),
+    determinants=("translation", "actuation", "rotation"),
+    singularities=(
+        Singularity("serial", "a limb stretched or folded, sin θ_i3 = 0", "(27)"),
+        Singularity("translation", "det V = 0: uncontrolled if driven at the joints", "(20), (25)"),
+        Singularity("actuation", "det W = 0: uncontrolled if driven by the motors", "(35), (36)"),
+        Singularity("rotation", "det H = 0: the coordinate planes, platform free to rotate", "(14), (17)"),
+    ),
+    example=MappingProxyType({"db": 0.1, "dp": 0.06, "f": 0.25, "r": 0.25, "k": 1.0}),
+    build=build,
+    farthest_reach=farthest_reach,
+)

@@ -1,0 +1,128 @@
+"""From A ẋ = diag(b) q̇ to the Jacobian, its singular values and its conditioning.
+
+Everything is formed from K = adj(A) diag(b) = det(A) J, so that nothing is divided by a determinant
+that may vanish: at a parallel or serial singularity the conditioning is 0, not undefined.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+
+@njit(error_model="numpy")
+def _cross(u, v):  # type: ignore[no-untyped-def]
+    return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+
+
+@njit(error_model="numpy")
+def _square(u):  # type: ignore[no-untyped-def]
+    return u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
+
+
+@njit(error_model="numpy")
+def adjugate_columns(rows):  # type: ignore[no-untyped-def]
+    """Columns of adj(A) for A given by rows, and det A."""
+    first = _cross(rows[1], rows[2])
+    second = _cross(rows[2], rows[0])
+    third = _cross(rows[0], rows[1])
+    determinant = rows[0][0] * first[0] + rows[0][1] * first[1] + rows[0][2] * first[2]
+    return (first, second, third), determinant
+
+
+@njit(error_model="numpy")
+def scaled_singular_values(columns):  # type: ignore[no-untyped-def]
+    """(greatest, least) singular value of the matrix with these columns.
+
+    Eigenvalues of the Gram matrix in closed form; the least from the determinant, which keeps its
+    relative accuracy when the matrix is nearly singular.
+    """
+    u, v, w = columns
+    g11, g22, g33 = _square(u), _square(v), _square(w)
+    g12 = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    g13 = u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
+    g23 = v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
+    mean = (g11 + g22 + g33) / 3.0
+    if not mean > 0.0:
+        return 0.0, 0.0
+    d1, d2, d3 = g11 - mean, g22 - mean, g33 - mean
+    off = g12 * g12 + g13 * g13 + g23 * g23
+    spread = math.sqrt((d1 * d1 + d2 * d2 + d3 * d3 + 2.0 * off) / 6.0)
+    if spread <= 1e-15 * mean:
+        return math.sqrt(mean), math.sqrt(mean)
+    shifted = d1 * (d2 * d3 - g23 * g23) - g12 * (g12 * d3 - g23 * g13) + g13 * (g12 * g23 - d2 * g13)
+    angle = math.acos(min(1.0, max(-1.0, 0.5 * shifted / spread**3))) / 3.0
+    greatest = mean + 2.0 * spread * math.cos(angle)
+    middle = mean + 2.0 * spread * math.cos(angle - 2.0 * math.pi / 3.0)
+    cross = _cross(v, w)
+    determinant = u[0] * cross[0] + u[1] * cross[1] + u[2] * cross[2]
+    if not middle > 0.0:
+        return math.sqrt(greatest), 0.0
+    return math.sqrt(greatest), abs(determinant) / math.sqrt(greatest * middle)
+
+
+@njit(error_model="numpy")
+def _scaled_columns(columns, b):  # type: ignore[no-untyped-def]
+    u, v, w = columns
+    return (
+        (u[0] * b[0], u[1] * b[0], u[2] * b[0]),
+        (v[0] * b[1], v[1] * b[1], v[2] * b[1]),
+        (w[0] * b[2], w[1] * b[2], w[2] * b[2]),
+    )
+
+
+@njit(error_model="numpy")
+def inverse_condition_2(rows, b):  # type: ignore[no-untyped-def]
+    """1/κ₂ = σ_min/σ_max of J, in [0, 1]."""
+    columns, _ = adjugate_columns(rows)
+    greatest, least = scaled_singular_values(_scaled_columns(columns, b))
+    return least / greatest if greatest > 0.0 else 0.0
+
+
+@njit(error_model="numpy")
+def inverse_condition_frobenius(rows, b):  # type: ignore[no-untyped-def]
+    """1/κ_F = 3/(‖J‖_F ‖J⁻¹‖_F), in [0, 1] (Gosselin & Angeles 1991, weight 1/n)."""
+    columns, determinant = adjugate_columns(rows)
+    u, v, w = _scaled_columns(columns, b)
+    forward = _square(u) + _square(v) + _square(w)
+    c1, c2, c3 = b[1] * b[2], b[2] * b[0], b[0] * b[1]
+    backward = c1 * c1 * _square(rows[0]) + c2 * c2 * _square(rows[1]) + c3 * c3 * _square(rows[2])
+    product = forward * backward
+    if not product > 0.0:
+        return 0.0
+    return 3.0 * abs(determinant * b[0] * c1) / math.sqrt(product)
+
+
+@njit(error_model="numpy")
+def singular_values(rows, b):  # type: ignore[no-untyped-def]
+    """(greatest, least) singular value of J; the greatest is infinite where det A = 0."""
+    columns, determinant = adjugate_columns(rows)
+    greatest, least = scaled_singular_values(_scaled_columns(columns, b))
+    size = abs(determinant)
+    if size == 0.0:
+        return math.inf, (math.inf if least > 0.0 else 0.0)
+    return greatest / size, least / size
+
+
+@njit(error_model="numpy")
+def jacobian(rows, b):  # type: ignore[no-untyped-def]
+    """J = A⁻¹ diag(b) as three rows."""
+    columns, determinant = adjugate_columns(rows)
+    u, v, w = _scaled_columns(columns, b)
+    return (
+        (u[0] / determinant, v[0] / determinant, w[0] / determinant),
+        (u[1] / determinant, v[1] / determinant, w[1] / determinant),
+        (u[2] / determinant, v[2] / determinant, w[2] / determinant),
+    )
+
+
+@njit(error_model="numpy")
+def output_transmission(rows):  # type: ignore[no-untyped-def]
+    """Least η_i = |det[a_1 a_2 a_3]| / |a_j × a_k| of unit rows; 0 where two rows are parallel."""
+    columns, determinant = adjugate_columns(rows)
+    least = math.inf
+    for column in columns:
+        area = math.sqrt(_square(column))
+        least = min(least, abs(determinant) / area if area > 0.0 else 0.0)
+    return least

@@ -1,0 +1,73 @@
+"""What a metric declares about itself and what it gives back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from tpm_design.mechanisms.base import MechanismKind
+    from tpm_design.metrics.context import Context
+
+Sense = Literal["maximize", "minimize"]
+UNDEFINED = "undefined"
+
+
+@dataclass(frozen=True)
+class Option:
+    """One option of a metric.
+
+    ``kind``: "choice" (one of ``choices``), "number" (within ``minimum``..``maximum``, no unit) or
+    "point" (three lengths in the study's unit, handed on in metres). ``default`` None: not given.
+    """
+
+    name: str
+    kind: Literal["choice", "number", "point"]
+    description: str
+    default: Any = None
+    choices: tuple[str, ...] = ()
+    minimum: float = float("-inf")
+    maximum: float = float("inf")
+    required: bool = False
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A metric's value in SI units with its numeric error.
+
+    Values may be flat where a constraint on them fails; then ``depth`` ≤ 0 is added to a negative slack,
+    and ``full_slack`` replaces the slack of a constraint that asks for the full score 1 (coverage).
+    ``notes`` are extra columns, such as which locus was nearest.
+    """
+
+    value: float
+    error: float = 0.0
+    depth: float = 0.0
+    full_slack: float | None = None
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def undefined(cls, reason: str) -> Measurement:
+        """No value: the design is infeasible for the stated reason."""
+        return cls(float("nan"), notes={UNDEFINED: reason})
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One figure of merit. ``scale`` (in the metric's SI unit) makes its violation dimensionless."""
+
+    name: str
+    unit: str
+    better: Sense
+    scale: float
+    description: str
+    source: str
+    compute: Callable[[Context, Mapping[str, Any]], Measurement]
+    options: tuple[Option, ...] = ()
+    needs_region: bool = True
+    differentiable: bool = True
+    applies: Callable[[MechanismKind], bool] = lambda kind: True
+
+    def option(self, name: str) -> Option | None:
+        return next((option for option in self.options if option.name == name), None)

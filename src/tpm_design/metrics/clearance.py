@@ -1,0 +1,79 @@
+"""How far the region stays from singularities, from the reach boundary, and limb from limb."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from tpm_design.metrics.base import Measurement, Metric
+from tpm_design.metrics.context import Context
+from tpm_design.workspace.indices import CLEARANCE, LEGS, SERIAL, Index
+
+SEARCH = "search along the region's normals, then sliding along the locus, ARCHITECTURE.md"
+
+
+def _locus_distance(name: str) -> Callable[[Context, Mapping[str, Any]], Measurement]:
+    def compute(context: Context, options: Mapping[str, Any]) -> Measurement:
+        if not context.reachable:
+            return Measurement(context.reach.value, context.reach.error, notes={"locus": "out of reach"})
+        if name not in context.mechanism.kind.determinants:
+            return Measurement(context.size.value, context.size.error, notes={"locus": "none"})
+        found = context.locus_distance(context.mechanism.kind.determinants.index(name))
+        if found.pose is None:
+            return Measurement(context.size.value, context.size.error, notes={"locus": "none"})
+        return Measurement(found.value, found.error, notes={"locus": name})
+
+    return compute
+
+
+def _boundary_distance(context: Context, options: Mapping[str, Any]) -> Measurement:
+    if not context.reachable:
+        return Measurement(context.reach.value, context.reach.error)
+    # the leg margins are the distances to the shells, so their least value is the distance to the nearest
+    legs = context.least(Index(LEGS))
+    return Measurement(legs.value, legs.error)
+
+
+def _singularity_margin_min(context: Context, options: Mapping[str, Any]) -> Measurement:
+    if not context.reachable:
+        return Measurement(0.0, 0.0, depth=context.reach.value / context.mechanism.reach_radius())
+    serial = context.least(Index(SERIAL))
+    margins = [(serial.value, serial.error), *((side.margin, side.error) for side in context.sides)]
+    value, error = min(margins)
+    return Measurement(max(0.0, value), error, depth=min(0.0, value))
+
+
+def _link_clearance(context: Context, options: Mapping[str, Any]) -> Measurement:
+    if not context.reachable:
+        return Measurement.undefined("the region is not reachable")
+    extreme = context.least(Index(CLEARANCE))
+    return Measurement(extreme.value, extreme.error)
+
+
+def _distance(name: str, condition: str) -> Metric:
+    return Metric(
+        f"{name}_singularity_distance", "m", "maximize", 0.1,
+        f"least Euclidean distance from the region to {condition}; minus the depth where it cuts in",
+        SEARCH, _locus_distance(name), differentiable=False,
+    )  # fmt: skip
+
+
+METRICS = (
+    _distance("translation", "det V = 0"),
+    _distance("actuation", "det W = 0"),
+    _distance("rotation", "det H = 0"),
+    Metric(
+        "boundary_distance", "m", "maximize", 0.1,
+        "least Euclidean distance from the region to the reach boundary", SEARCH, _boundary_distance,
+    ),
+    Metric(
+        "singularity_margin_min", "-", "maximize", 1.0,
+        "least dimensionless margin over the region, serial singularities included", SEARCH,
+        _singularity_margin_min,
+    ),
+    Metric(
+        "link_clearance", "m", "maximize", 0.1,
+        "least distance between links of different limbs, less the link diameters, over the region",
+        "links as capsules", _link_clearance,
+    ),
+)  # fmt: skip

@@ -1,0 +1,119 @@
+"""Local and global conditioning indices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tpm_design.metrics.base import Measurement, Metric, Option
+from tpm_design.metrics.context import Context
+from tpm_design.workspace.averages import Averages, conditioning_averages
+from tpm_design.workspace.indices import CONDITION_2, CONDITION_FROBENIUS, Index, index_values
+from tpm_design.workspace.region_geometry import POINTS
+
+SOURCE = "C. Gosselin, J. Angeles, A global performance index for the kinematic optimization, 1991"
+NORM = Option("norm", "choice", "norm of the condition number", default="2", choices=("2", "frobenius"))
+DRIVE = Option(
+    "drive", "choice", "actuators: motors or joints", default="motor", choices=("motor", "joint")
+)
+OVER = Option("over", "choice", "domain", default="region", choices=("region", "aspect"))
+THRESHOLD = Option(
+    "threshold", "number", "1/κ asked for", minimum=0.0, maximum=1.0, required=True
+)
+
+
+def _index(context: Context, options: Mapping[str, Any]) -> Index:
+    quantity = CONDITION_FROBENIUS if options["norm"] == "frobenius" else CONDITION_2
+    return Index(quantity, motor=context.mechanism.motor_weight(options["drive"]))
+
+
+def _averages(context: Context, options: Mapping[str, Any], threshold: float) -> tuple[Averages, Averages]:
+    fields = context.aspects if options["over"] == "aspect" else context.region_aspects
+    frobenius = options["norm"] == "frobenius"
+    motor = context.mechanism.motor_weight(options["drive"])
+    fine, coarse = (
+        conditioning_averages(
+            context.mechanism.geometry,
+            context.mode.signs,
+            field,
+            component=field.largest() if options["over"] == "aspect" else None,
+            frobenius=frobenius,
+            motor=motor,
+            threshold=threshold,
+        )
+        for field in fields
+    )
+    return fine, coarse
+
+
+def _minimum(context: Context, options: Mapping[str, Any]) -> Measurement:
+    if options["over"] == "aspect":
+        fine, coarse = _averages(context, options, 0.5)
+        return Measurement(fine.least, abs(fine.least - coarse.least))
+    extreme = context.least(_index(context, options))
+    if not context.reachable:
+        # unreachable poses count as singular; the reach shortfall guides a search back
+        shortfall = context.reach.value / context.mechanism.reach_radius()
+        return Measurement(0.0, 0.0, depth=shortfall)
+    if min(side.margin for side in context.sides) < 0.0 and extreme.value > 0.0:
+        return Measurement(extreme.value, extreme.value)
+    return Measurement(extreme.value, extreme.error)
+
+
+def _at_points(context: Context, options: Mapping[str, Any]) -> np.ndarray:
+    values = index_values(
+        context.mechanism.geometry, context.mode.signs, _index(context, options), context.poses
+    )
+    usable = ~np.isnan(context.mechanism.ik(context.poses, context.mode)).any(axis=1)
+    return np.where(usable, values, 0.0)
+
+
+def _mean(context: Context, options: Mapping[str, Any]) -> Measurement:
+    if options["over"] == "region" and context.placed.form == POINTS:
+        return Measurement(float(_at_points(context, options).mean()))
+    fine, coarse = (
+        _share_of(context, options, averages, averages.conditioning, coarse)
+        for coarse, averages in enumerate(_averages(context, options, 0.5))
+    )
+    return Measurement(fine, abs(fine - coarse))
+
+
+def _share(context: Context, options: Mapping[str, Any]) -> Measurement:
+    threshold = options["threshold"]
+    if options["over"] == "region" and context.placed.form == POINTS:
+        return Measurement(float((_at_points(context, options) >= threshold).mean()))
+    fine, coarse = (
+        _share_of(context, options, averages, averages.above, coarse)
+        for coarse, averages in enumerate(_averages(context, options, threshold))
+    )
+    return Measurement(fine, abs(fine - coarse))
+
+
+def _share_of(
+    context: Context, options: Mapping[str, Any], averages: Averages, integral: float, coarse: int
+) -> float:
+    """Integral over the domain's whole volume: poses of the region out of reach count as 0."""
+    if options["over"] == "region":
+        whole = context.region_aspects[coarse].whole
+    else:
+        whole = averages.volume
+    # a domain that is whole may differ from its parts by rounding
+    return min(1.0, integral / whole) if whole > 0.0 else 0.0
+
+
+METRICS = (
+    Metric(
+        "conditioning_min", "-", "maximize", 1.0, "least 1/κ over the domain", SOURCE, _minimum,
+        (NORM, DRIVE, OVER),
+    ),
+    Metric(
+        "conditioning_mean", "-", "maximize", 1.0, "volume mean of 1/κ (GCI)", SOURCE, _mean,
+        (NORM, DRIVE, OVER),
+    ),
+    Metric(
+        "conditioning_share", "-", "maximize", 1.0, "share of the domain with 1/κ ≥ threshold", SOURCE,
+        _share, (NORM, DRIVE, OVER, THRESHOLD),
+    ),
+)  # fmt: skip

@@ -1,0 +1,168 @@
+"""One design seen by its metrics: what several of them need is computed once, when first asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.workspace.aspects import RayField, locate, locus_points, mode_field, region_field
+from tpm_design.workspace.extremes import Extreme, least_over_region
+from tpm_design.workspace.indices import DETERMINANT, EXTENT, REACH, Index
+from tpm_design.workspace.loci import LocusDistance, locus_distance
+from tpm_design.workspace.region_geometry import PlacedRegion
+from tpm_design.workspace.sampling import feelers, lattice
+from tpm_design.workspace.volume import coarser, rays_for
+
+FEELERS_PER_SAMPLE = 0.8
+SURVEY_RAYS_PER_SAMPLE = 2
+
+
+@dataclass(frozen=True)
+class Sides:
+    """For one determinant over the region: ``margin`` its least value on the side it mostly keeps
+    (negative where it changes sign), with ``error``; ``code`` +1 or −1 for that side."""
+
+    margin: float
+    error: float
+    code: int
+
+
+@dataclass(frozen=True)
+class Context:
+    """A mechanism in a working mode with its placed region, if the study has one.
+
+    ``volume_rtol``: relative error aimed at by volumes and averages. ``region_samples``: lattice poses
+    along the region's longest edge.
+    """
+
+    mechanism: Mechanism
+    mode: Mode
+    region: PlacedRegion | None
+    volume_rtol: float
+    region_samples: int
+
+    @property
+    def placed(self) -> PlacedRegion:
+        """The region; metrics that need one are refused by the study where there is none."""
+        if self.region is None:
+            raise ValueError("this metric needs a region")
+        return self.region
+
+    @cached_property
+    def grid(self) -> NDArray[np.float64]:
+        """The region's lattice (I, J, K, 3) in metres."""
+        return lattice(self.placed, self.region_samples)
+
+    @cached_property
+    def poses(self) -> NDArray[np.float64]:
+        """The lattice as (N, 3)."""
+        return np.ascontiguousarray(self.grid.reshape(-1, 3))
+
+    @property
+    def spacing(self) -> float:
+        """Distance (m) between lattice poses along the longest edge."""
+        longest = 2.0 * max(self.placed.half)
+        return longest / max(1, self.region_samples - 1) if longest > 0.0 else 1e-3
+
+    def least(self, index: Index) -> Extreme:
+        """Least value of an index over the region (greatest for sign −1)."""
+        return least_over_region(
+            self.mechanism.geometry, self.mode.signs, self.placed, index, self.poses, self.spacing
+        )
+
+    @cached_property
+    def reach(self) -> Extreme:
+        """Least workspace margin (m) over the region: negative by the worst shortfall."""
+        return self.least(Index(REACH))
+
+    @property
+    def reachable(self) -> bool:
+        """Whether the whole region is reachable in the mode."""
+        return self.reach.value >= 0.0
+
+    @cached_property
+    def lattice_determinants(self) -> NDArray[np.float64]:
+        """Signed determinants (D, I, J, K) on the lattice, 0 where undefined."""
+        margins = self.mechanism.determinants(self.poses, self.mode)
+        return margins.reshape(len(margins), *self.grid.shape[:3])
+
+    @cached_property
+    def sides(self) -> tuple[Sides, ...]:
+        """Every determinant over the region, in the order of the mechanism."""
+        return tuple(self._side(part) for part in range(len(self.mechanism.kind.determinants)))
+
+    def _side(self, part: int) -> Sides:
+        values = self.lattice_determinants[part]
+        sign = 1.0 if values.min() + values.max() >= 0.0 else -1.0
+        extreme = self.least(Index(DETERMINANT, part=part, sign=sign))
+        return Sides(sign * extreme.value, extreme.error, int(sign))
+
+    @cached_property
+    def _survey(self) -> RayField:
+        return mode_field(self.mechanism, self.mode, order=SURVEY_RAYS_PER_SAMPLE * self.region_samples, sided=True)
+
+    def locus_distance(self, part: int) -> LocusDistance:
+        """Distance (m) to the locus of one determinant, for a region reachable throughout.
+
+        Feelers from the region see what is near; where they meet nothing, rays through the whole mode look
+        for what is small and far.
+        """
+        near = self._locus_distance(part, np.empty((0, 3)))
+        return near if near.pose is not None else self._locus_distance(part, locus_points(self._survey, part))
+
+    def _locus_distance(self, part: int, known: NDArray[np.float64]) -> LocusDistance:
+        count = max(3, round(FEELERS_PER_SAMPLE * self.region_samples))
+        points, normals = feelers(self.placed, count)
+        return locus_distance(
+            self.mechanism.geometry,
+            self.mode.signs,
+            self.placed,
+            part,
+            determinants=self.lattice_determinants,
+            grid=self.grid,
+            feeler_points=points,
+            feeler_normals=normals,
+            known=known,
+            spacing=self.spacing,
+            limit=0.0 if len(known) else 2.0 * self.mechanism.reach_radius(),
+        )
+
+    @cached_property
+    def size(self) -> Extreme:
+        """Longest side (m) of the bounding box of the joint centres over the region."""
+        sides = []
+        for axis in range(3):
+            low = self.least(Index(EXTENT, part=axis, sign=1.0))
+            high = self.least(Index(EXTENT, part=axis, sign=-1.0))
+            sides.append(Extreme(high.value - low.value, high.error + low.error, high.pose))
+        return max(sides, key=lambda side: side.value)
+
+    def mode_rays(self, margin: float, *, sided: bool) -> tuple[RayField, RayField]:
+        """Ray fields of the whole mode at the working order and at a coarser one."""
+        order = rays_for(self.volume_rtol)
+        return (
+            mode_field(self.mechanism, self.mode, order=order, sided=sided, floor=margin),
+            mode_field(self.mechanism, self.mode, order=coarser(order), sided=sided, floor=margin),
+        )
+
+    @cached_property
+    def aspects(self) -> tuple[RayField, RayField]:
+        """Ray fields of the mode's aspects, fine and coarse."""
+        return self.mode_rays(0.0, sided=True)
+
+    @cached_property
+    def region_aspects(self) -> tuple[RayField, RayField]:
+        """Ray fields of the region's parts in each aspect, fine and coarse."""
+        order = max(3, rays_for(self.volume_rtol) // 2)
+        return (
+            region_field(self.mechanism, self.mode, self.placed, order=order),
+            region_field(self.mechanism, self.mode, self.placed, order=max(2, order - 1)),
+        )
+
+    def aspect_of(self, field: RayField, pose: tuple[float, float, float]) -> int | None:
+        """Component of ``field`` that holds ``pose``."""
+        return locate(self.mechanism, self.mode, field, pose)

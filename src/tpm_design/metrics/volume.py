@@ -1,0 +1,130 @@
+"""How much space the mechanism commands: volumes and coverage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tpm_design.metrics.base import Measurement, Metric, Option
+from tpm_design.metrics.context import Context
+from tpm_design.workspace.aspects import RayField
+from tpm_design.workspace.region_geometry import POINTS
+from tpm_design.workspace.volume import selected_volume
+
+RAYS = "volume by Gauss–Legendre rays, ARCHITECTURE.md"
+MARGIN = Option(
+    "margin", "number", "least |margin| of every determinant", default=0.0, minimum=0.0, maximum=0.999
+)
+HOME = Option("home", "point", "the aspect that holds this pose instead of the largest one")
+
+
+def _reachable_volume(context: Context, options: Mapping[str, Any]) -> Measurement:
+    fine, coarse = (
+        selected_volume(field, largest_only=False) for field in context.mode_rays(0.0, sided=False)
+    )
+    return Measurement(fine, abs(fine - coarse))
+
+
+def _aspect_volume(context: Context, field: RayField, home: tuple[float, float, float] | None) -> float:
+    if home is None:
+        return selected_volume(field, largest_only=True)
+    component = context.aspect_of(field, home)
+    return 0.0 if component is None else float(field.volumes[component])
+
+
+def _singularity_free_volume(context: Context, options: Mapping[str, Any]) -> Measurement:
+    margin = options["margin"]
+    fields = context.aspects if margin == 0.0 else context.mode_rays(margin, sided=True)
+    fine, coarse = (_aspect_volume(context, field, options["home"]) for field in fields)
+    return Measurement(fine, abs(fine - coarse))
+
+
+def _workspace_ratio(context: Context, options: Mapping[str, Any]) -> Measurement:
+    volume = _singularity_free_volume(context, {"margin": 0.0, "home": None})
+    if not context.reachable:
+        return Measurement.undefined("the region is not reachable, so the robot's size is not known")
+    size = context.size
+    ratio = volume.value / size.value**3
+    return Measurement(ratio, volume.error / size.value**3 + 3.0 * ratio * size.error / size.value)
+
+
+def _coverage(context: Context, options: Mapping[str, Any]) -> Measurement:
+    length = context.mechanism.reach_radius()
+    worst = min(context.reach.value / length, min(side.margin for side in context.sides))
+    if worst >= 0.0:
+        return Measurement(1.0, 0.0, full_slack=worst)
+    fine, coarse = (
+        _point_shares(context) if context.placed.form == POINTS else _solid_shares(context)
+    )
+    # what the samples' polish found outside is smaller than the rays resolve
+    share = min(fine, 1.0 - RESOLUTION)
+    return Measurement(share, max(abs(fine - coarse), RESOLUTION), full_slack=worst)
+
+
+RESOLUTION = 1e-6
+
+
+def _solid_shares(context: Context) -> tuple[float, float]:
+    fine, coarse = (_largest_share(context, field) for field in context.region_aspects)
+    return fine, coarse
+
+
+def _largest_share(context: Context, field: RayField) -> float:
+    """Share of the region in one aspect; parts of equal sides may be joined outside the region."""
+    if not field.volumes.size:
+        return 0.0
+    keys = []
+    for component in range(field.volumes.size):
+        first = int(np.argmax(field.component == component))
+        code = int(field.segments.code[first])
+        keys.append((code, component))
+    by_code: dict[int, list[int]] = {}
+    for code, component in keys:
+        by_code.setdefault(code, []).append(component)
+    totals: dict[tuple[int, int], float] = {}
+    for code, components in by_code.items():
+        for component in components:
+            aspect = _aspect_of_component(context, field, component) if len(components) > 1 else 0
+            totals[code, aspect] = totals.get((code, aspect), 0.0) + float(field.volumes[component])
+    return max(totals.values()) / field.whole
+
+
+def _aspect_of_component(context: Context, field: RayField, component: int) -> int:
+    members = np.flatnonzero(field.component == component)
+    lengths = field.segments.end[members] - field.segments.start[members]
+    member = members[np.argmax(lengths)]
+    middle = 0.5 * (field.segments.start[member] + field.segments.end[member])
+    direction = field.rays.directions[field.segments.ray[member]]
+    pose = np.asarray(field.origin) + middle * np.asarray(field.scale) * direction
+    found = context.aspect_of(context.aspects[0], (float(pose[0]), float(pose[1]), float(pose[2])))
+    return -1 - component if found is None else found
+
+
+def _point_shares(context: Context) -> tuple[float, float]:
+    aspects = [context.aspect_of(context.aspects[0], tuple(pose)) for pose in context.poses]
+    found = [aspect for aspect in aspects if aspect is not None]
+    share = max((found.count(aspect) for aspect in set(found)), default=0) / len(aspects)
+    return share, share
+
+
+METRICS = (
+    Metric(
+        "reachable_volume", "m³", "maximize", 0.1, "volume of the mode's reachable poses", RAYS,
+        _reachable_volume, needs_region=False,
+    ),
+    Metric(
+        "singularity_free_volume", "m³", "maximize", 0.1,
+        "volume of the largest aspect, or of the one that holds `home`", RAYS,
+        _singularity_free_volume, (MARGIN, HOME), needs_region=False,
+    ),
+    Metric(
+        "coverage", "-", "maximize", 1.0,
+        "largest share of the region that lies in one aspect; 1 when all of it does", RAYS, _coverage,
+    ),
+    Metric(
+        "workspace_ratio", "-", "maximize", 1.0, "singularity-free volume over robot_size³", RAYS,
+        _workspace_ratio,
+    ),
+)  # fmt: skip

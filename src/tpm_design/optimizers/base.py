@@ -1,0 +1,79 @@
+"""What every optimiser declares and the one view of the problem it is given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class BudgetSpent(Exception):  # noqa: N818 - an ordinary end of a search, not an error
+    """Raised by ``Search.evaluate`` when the next point would exceed the budget."""
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """Values at N points: ``objective`` (N,) to minimise, ``constraints`` (N, m) met where ≥ 0 (each
+    divided by its metric's scale), ``merit`` (N,) = objective + exact penalty, finite everywhere."""
+
+    objective: FloatArray
+    constraints: FloatArray
+    merit: FloatArray
+
+
+class Search(Protocol):
+    """The problem as an optimiser sees it: points of the unit cube [0, 1]^n, no units, no mechanism.
+
+    ``levels[i]``: 0 for a continuous variable, else the number of values of a discrete one; value j
+    of L is the coordinate interval [j/L, (j+1)/L), centre (j + 0.5)/L.
+    """
+
+    @property
+    def dimension(self) -> int: ...
+    @property
+    def levels(self) -> tuple[int, ...]: ...
+    @property
+    def start(self) -> FloatArray: ...
+    @property
+    def constraint_count(self) -> int: ...
+
+    def evaluate(self, points: FloatArray) -> Outcomes:
+        """Values at ``points`` (N, n), in order; repeated points cost nothing. Raises BudgetSpent."""
+        ...
+
+
+@dataclass(frozen=True)
+class Abilities:
+    """What a method can work with.
+
+    ``constraints``: it handles inequalities itself (otherwise it is given the merit). ``discrete``: it
+    may be given variables with levels. ``derivatives``: it follows gradients, so every metric must be
+    differentiable. ``random``: its path depends on the seed. ``whole_space``: global, as opposed to
+    local from ``start``. ``batch``: it evaluates whole populations at once, so workers help.
+    """
+
+    constraints: bool
+    discrete: bool
+    derivatives: bool
+    random: bool
+    whole_space: bool
+    batch: bool
+    smallest_dimension: int = 1
+    largest_dimension: int | None = None
+
+
+@dataclass(frozen=True)
+class Optimizer:
+    """One method. ``run(search, seed)`` searches until it converges and returns one sentence on how it
+    ended; BudgetSpent passes through it."""
+
+    name: str
+    description: str
+    source: str
+    abilities: Abilities
+    run: Callable[[Search, int], str]

@@ -1,0 +1,175 @@
+"""Design space + metrics + constraints → Evaluation: the only place that evaluates a design."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from tpm_design.errors import ParameterError
+from tpm_design.mechanisms.base import Dimension, MechanismKind
+from tpm_design.metrics.base import UNDEFINED, Measurement, Metric, Sense
+from tpm_design.metrics.context import Context
+from tpm_design.workspace.region_geometry import place
+from tpm_design.workspace.regions import Shape
+
+CENTRE = ("center_x", "center_y", "center_z")
+UNDEFINED_VIOLATION = 1.0
+
+Design = Mapping[str, float | str]
+"""Parameter names → SI values, ``center_x`` … → metres, ``mode`` → the mode's label."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One free quantity. Continuous: ``lower``..``upper``. Otherwise one of ``values`` (SI or mode labels).
+
+    ``mirrored``: the value takes the sign of the mode's octant along that axis, so that a search over
+    octants keeps one range.
+    """
+
+    name: str
+    dimension: Dimension | Literal["mode"]
+    lower: float = 0.0
+    upper: float = 0.0
+    values: tuple[float, ...] | tuple[str, ...] = ()
+    initial: float | str | None = None
+    mirrored: bool = False
+
+
+@dataclass(frozen=True)
+class Goal:
+    """One metric with its options, as an objective, a constraint or a recorded figure.
+
+    Objective: ``sense``. Constraint: ``minimum`` and/or ``maximum`` in SI. Recorded: none of them.
+    """
+
+    metric: Metric
+    label: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    sense: Sense | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """``volume``: relative error wanted of volumes and averages. ``region_samples``: samples along the
+    longest edge of the region from which its extremes are polished."""
+
+    volume: float = 1e-3
+    region_samples: int = 9
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What a study asks. ``modes``: label → sign strings, e.g. ``{"+++ +-+": {"octant": …, "elbows": …}}``."""
+
+    kind: MechanismKind
+    fixed: Mapping[str, float | str]
+    variables: tuple[Variable, ...]
+    modes: Mapping[str, Mapping[str, str]]
+    limits: Mapping[str, Any]
+    region: Shape | None
+    objectives: tuple[Goal, ...]
+    constraints: tuple[Goal, ...]
+    record: tuple[Goal, ...]
+    accuracy: Accuracy = Accuracy()
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One evaluated design, SI units. ``slacks``: constraint label → signed distance to its bound."""
+
+    design: Design
+    metrics: Mapping[str, float]
+    errors: Mapping[str, float]
+    slacks: Mapping[str, float]
+    notes: Mapping[str, str]
+    violation: float
+    status: Literal["feasible", "infeasible", "failed"]
+    reason: str
+    seconds: float
+
+
+def evaluate(problem: Problem, design: Design) -> Evaluation:
+    """Every objective, constraint and recorded metric of one design.
+
+    A constraint is met only on the unfavourable side of its metric's numeric error. A design that cannot
+    be built or measured gets status "failed" and its reason; nothing is raised.
+    """
+    began = time.perf_counter()
+    goals = (*problem.objectives, *problem.constraints, *problem.record)
+    try:
+        context = design_context(problem, design)
+        measurements = {goal.label: _measure(context, goal) for goal in goals}
+    except (ParameterError, ArithmeticError) as error:
+        reason = error.what if isinstance(error, ParameterError) else str(error)
+        return Evaluation(
+            dict(design), {}, {}, {}, {}, math.inf, "failed", reason, time.perf_counter() - began
+        )
+    undefined = {label: m.notes[UNDEFINED] for label, m in measurements.items() if UNDEFINED in m.notes}
+    slacks = {goal.label: slack(goal, measurements[goal.label]) for goal in problem.constraints}
+    short = {
+        goal.label: max(0.0, -slacks[goal.label]) / goal.metric.scale for goal in problem.constraints
+    }
+    for goal in problem.objectives:
+        if goal.label in undefined:
+            short[goal.label] = UNDEFINED_VIOLATION
+    violation = sum(short.values())
+    missed = [label for label, value in short.items() if value > 0.0]
+    return Evaluation(
+        design=dict(design),
+        metrics={label: m.value for label, m in measurements.items()},
+        errors={label: m.error for label, m in measurements.items()},
+        slacks=slacks,
+        notes={
+            f"{label} {key}": note
+            for label, m in measurements.items()
+            for key, note in m.notes.items()
+            if key != UNDEFINED
+        },
+        violation=violation,
+        status="infeasible" if missed else "feasible",
+        reason="; ".join(
+            f"{label}: {undefined[label]}" if label in undefined else f"{label} missed" for label in missed
+        ),
+        seconds=time.perf_counter() - began,
+    )
+
+
+def design_context(problem: Problem, design: Design) -> Context:
+    """The mechanism, mode and placed region of one design. Raises ParameterError where it cannot be."""
+    names = set(problem.kind.parameter_names())
+    values = {name: value for name, value in design.items() if name in names}
+    mechanism = problem.kind.build(values, problem.limits)
+    mode = mechanism.mode_of(problem.modes[str(design["mode"])])
+    region = None
+    if problem.region is not None:
+        centre = (float(design[CENTRE[0]]), float(design[CENTRE[1]]), float(design[CENTRE[2]]))
+        region = place(problem.region, centre)
+    return Context(mechanism, mode, region, problem.accuracy.volume, problem.accuracy.region_samples)
+
+
+def slack(goal: Goal, measurement: Measurement) -> float:
+    """Signed distance of a constraint to its bound, less the numeric error: met where ≥ 0. In the
+    metric's unit, or as the metric defines it where its value is flat."""
+    if UNDEFINED in measurement.notes:
+        return -UNDEFINED_VIOLATION * goal.metric.scale
+    value, error = measurement.value, measurement.error
+    below = math.inf if goal.minimum is None else value - error - goal.minimum
+    above = math.inf if goal.maximum is None else goal.maximum - value - error
+    least = min(below, above)
+    if measurement.full_slack is not None and goal.minimum is not None and goal.minimum >= 1.0:
+        return measurement.full_slack
+    return least + measurement.depth if least < 0.0 else least
+
+
+def _measure(context: Context, goal: Goal) -> Measurement:
+    options = {option.name: goal.options.get(option.name, option.default) for option in goal.metric.options}
+    measurement = goal.metric.compute(context, options)
+    if not math.isfinite(measurement.value) and UNDEFINED not in measurement.notes:
+        raise ArithmeticError(f"{goal.label} is {measurement.value!r}")
+    return measurement

@@ -1,0 +1,163 @@
+"""One search from start to status sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tpm_design.design_space import DesignSpace, octant_signs
+from tpm_design.errors import RefusedError
+from tpm_design.optimizers import check_pair, optimizer
+from tpm_design.optimizers.base import BudgetSpent, Optimizer
+from tpm_design.problem import Goal, Problem
+from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch
+
+POLISH_SHARE = 0.25
+"""Part of the budget kept for polishing. The whole-space search does not know it: a larger budget lets the
+same path go on."""
+
+
+@dataclass(frozen=True)
+class SearchPlan:
+    """Which method searches for how many evaluations, and which local method polishes what it found."""
+
+    method: str
+    budget: int
+    seed: int
+    polish: str | None
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """The log in order, its best entry, and how it ended. ``ending``: "converged", "budget spent" or
+    "interrupted"; ``status`` one sentence with what to do where the result is not what was hoped for."""
+
+    entries: tuple[Entry, ...]
+    best: Entry | None
+    ending: str
+    status: str
+    remarks: tuple[str, ...]
+
+
+def check_plan(problem: Problem, plan: SearchPlan) -> None:
+    """Refuse what cannot work before anything runs. Raises RefusedError or UsageError."""
+    if len(problem.objectives) != 1:
+        raise RefusedError(
+            f"The study has {len(problem.objectives)} objectives; the methods here take one.",
+            remedy="Keep one objective and make the others constraints.",
+        )
+    if not problem.variables:
+        raise RefusedError(
+            "Nothing is free in this study.", remedy="Give a parameter {min, max}, or use `evaluate`."
+        )
+    goals = (*problem.objectives, *problem.constraints)
+    rough = [goal.label for goal in goals if not goal.metric.differentiable]
+    discrete = [variable.name for variable in problem.variables if variable.values]
+    method = optimizer(plan.method)
+    check_pair(method, dimension=len(problem.variables), discrete=discrete, nondifferentiable=rough)
+    if plan.polish is not None:
+        polish = optimizer(plan.polish)
+        if polish.abilities.whole_space:
+            raise RefusedError(
+                f"{polish.name} searches the whole space and cannot polish.",
+                remedy="Choose a local method, such as nlopt.cobyla.",
+            )
+        count = len(problem.variables) - len(discrete)
+        if count:
+            check_pair(polish, dimension=count, discrete=[], nondifferentiable=rough)
+
+
+def search(
+    problem: Problem, plan: SearchPlan, *, workers: int, record: Callable[[Entry], None]
+) -> SearchResult:
+    """Run the plan. ``record`` gets each evaluation as it ends. Raises what ``check_plan`` raises.
+
+    Ctrl-C ends the search as "interrupted" with everything evaluated so far.
+    """
+    check_plan(problem, plan)
+    method = optimizer(plan.method)
+    space = DesignSpace(problem.variables, problem.fixed, octant_signs(problem.modes))
+    log = EvaluationLog(problem, workers=workers, record=record)
+    kept = int(POLISH_SHARE * plan.budget) if plan.polish is not None else 0
+    whole = UnitSearch(log, space, space.start(), max(1, plan.budget - kept))
+    remarks = _remarks(method, problem)
+    try:
+        ending, detail = _run(method, whole, plan.seed)
+        if plan.polish is not None:
+            ending, detail = _polish(optimizer(plan.polish), whole, plan)
+    except KeyboardInterrupt:
+        ending, detail = "interrupted", "The search was interrupted."
+    finally:
+        log.close()
+    best = log.best()
+    status = status_sentence(problem, best, len(log.entries), detail)
+    return SearchResult(tuple(log.entries), best, ending, status, remarks)
+
+
+def _run(method: Optimizer, view: UnitSearch, seed: int) -> tuple[str, str]:
+    try:
+        return "converged", method.run(view, seed)
+    except BudgetSpent:
+        return "budget spent", "The budget was spent."
+
+
+def _polish(method: Optimizer, whole: UnitSearch, plan: SearchPlan) -> tuple[str, str]:
+    """Polish the best design, then the best one of every other choice of the discrete variables."""
+    log = whole.log
+    polished = set()
+    ending, detail = "converged", ""
+    while len(log.entries) < plan.budget:
+        choices: dict[tuple[object, ...], Entry] = {}
+        for entry in sorted(log.entries, key=log.rank):
+            choices.setdefault(_choice(whole.space, entry), entry)
+        left = [(key, entry) for key, entry in choices.items() if key not in polished]
+        if not left or not whole.space.holding_discrete(left[0][1].evaluation.design).variables:
+            break
+        key, entry = left[0]
+        polished.add(key)
+        ending, detail = _run(method, whole.continuous_around(entry, plan.budget), plan.seed)
+    if len(log.entries) >= plan.budget:
+        return "budget spent", "The budget was spent."
+    return ending, detail or "The search converged."
+
+
+def _choice(space: DesignSpace, entry: Entry) -> tuple[object, ...]:
+    return tuple(entry.evaluation.design[v.name] for v in space.variables if v.values)
+
+
+def _remarks(method: Optimizer, problem: Problem) -> tuple[str, ...]:
+    if problem.constraints and not method.abilities.constraints:
+        return (
+            f"{method.name} takes no constraints: it minimised the objective plus an exact penalty on the "
+            "violation.",
+        )
+    return ()
+
+
+def binding(problem: Problem, best: Entry) -> tuple[Goal, float] | None:
+    """The constraint that limits a design: the one of least scaled slack. None without constraints."""
+    scaled = [
+        (best.evaluation.slacks[goal.label] / goal.metric.scale, goal)
+        for goal in problem.constraints
+        if goal.label in best.evaluation.slacks
+    ]
+    if not scaled:
+        return None
+    slack, goal = min(scaled, key=lambda pair: pair[0])
+    return goal, slack
+
+
+def status_sentence(problem: Problem, best: Entry | None, count: int, detail: str) -> str:
+    """How the search ended, in one or two sentences, with a remedy where nothing feasible was found."""
+    if best is None:
+        return f"{detail} No design was evaluated."
+    if best.evaluation.status == "feasible":
+        return f"{detail} Best feasible design of {count} evaluations: number {best.number}."
+    if best.evaluation.status == "failed":
+        return f"{detail} None of {count} designs could be evaluated: {best.evaluation.reason}"
+    limit = binding(problem, best)
+    label = limit[0].label if limit else "the objective"
+    return (
+        f"{detail} No feasible design in {count} evaluations; the closest misses {label} (violation "
+        f"{best.evaluation.violation:.3g}). Widen the ranges, relax {label} or raise the budget."
+    )

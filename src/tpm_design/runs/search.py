@@ -1,0 +1,155 @@
+"""The problem as an optimiser sees it: budgeted, memoised, logged, evaluated by several threads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpm_design.design_space import DesignSpace
+from tpm_design.optimizers.base import BudgetSpent, Outcomes
+from tpm_design.problem import Design, Evaluation, Problem, evaluate
+
+FloatArray = NDArray[np.float64]
+Key = tuple[float | str, ...]
+
+PENALTY = 1e3
+"""Weight of the violation in the merit of methods without constraints: above the multipliers that
+scaled objectives and constraints have, so that the penalised optimum is the constrained one."""
+
+FAILED = 1e6
+"""Objective and shortfall given to an optimiser for a design that could not be measured."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One evaluation in the log, numbered from 0 in the order in which points were asked for."""
+
+    number: int
+    evaluation: Evaluation
+
+
+class EvaluationLog:
+    """Every distinct design evaluated so far. The one place that counts evaluations.
+
+    ``record`` is called with each entry, in order, as soon as it is there.
+    """
+
+    def __init__(
+        self, problem: Problem, *, workers: int, record: Callable[[Entry], None] = lambda entry: None
+    ) -> None:
+        self.problem = problem
+        self.entries: list[Entry] = []
+        self._numbers: dict[Key, int] = {}
+        self._record = record
+        self._pool = ThreadPoolExecutor(max_workers=workers) if workers > 1 else None
+
+    def close(self) -> None:
+        """End the worker threads; evaluations not begun are dropped."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def evaluations(self, designs: Sequence[Design], limit: int) -> list[Evaluation]:
+        """Evaluations of the designs, in order; repeated ones are answered from the log.
+
+        Raises BudgetSpent once the log holds ``limit`` entries and another is needed; what fits is
+        evaluated and logged first.
+        """
+        keys = [design_key(design) for design in designs]
+        fresh: dict[Key, Design] = {}
+        for key, design in zip(keys, designs, strict=True):
+            if key not in self._numbers and key not in fresh:
+                fresh[key] = design
+        allowed = max(0, limit - len(self.entries))
+        wanted = list(fresh.items())[:allowed]
+        run = map if self._pool is None else self._pool.map
+        for (key, _), result in zip(
+            wanted, run(lambda item: evaluate(self.problem, item[1]), wanted), strict=True
+        ):
+            entry = Entry(len(self.entries), result)
+            self._numbers[key] = entry.number
+            self.entries.append(entry)
+            self._record(entry)
+        if len(wanted) < len(fresh):
+            raise BudgetSpent
+        return [self.entries[self._numbers[key]].evaluation for key in keys]
+
+    def best(self) -> Entry | None:
+        """The feasible entry of least objective, else the one of least violation; None if empty."""
+        return min(self.entries, key=self.rank, default=None)
+
+    def rank(self, entry: Entry) -> tuple[float, float, int]:
+        """Sorts entries: feasible ones first by objective, then by violation; ties by number."""
+        objective = minimised(self.problem, entry.evaluation)
+        if entry.evaluation.status == "feasible":
+            return (0.0, objective, entry.number)
+        return (1.0 + entry.evaluation.violation, objective, entry.number)
+
+
+@dataclass(frozen=True)
+class UnitSearch:
+    """A ``Search`` over a design space, up to ``limit`` entries in the log."""
+
+    log: EvaluationLog
+    space: DesignSpace
+    start: FloatArray
+    limit: int
+
+    @property
+    def dimension(self) -> int:
+        return len(self.space.variables)
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        return self.space.levels
+
+    @property
+    def constraint_count(self) -> int:
+        return len(self.log.problem.constraints)
+
+    def evaluate(self, points: FloatArray) -> Outcomes:
+        """Values at ``points`` (N, n). Raises BudgetSpent."""
+        table = np.atleast_2d(np.asarray(points, dtype=np.float64))
+        results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
+        return outcomes(self.log.problem, results)
+
+    def continuous_around(self, entry: Entry, limit: int) -> UnitSearch:
+        """The search of the continuous variables alone, from a design already evaluated."""
+        space = self.space.holding_discrete(entry.evaluation.design)
+        return replace(self, space=space, start=space.point(entry.evaluation.design), limit=limit)
+
+
+def design_key(design: Design) -> Key:
+    """Exact identity of a design."""
+    return tuple(design[name] for name in sorted(design))
+
+
+def minimised(problem: Problem, evaluation: Evaluation) -> float:
+    """The first objective over its scale, turned so that less is better; FAILED where there is none."""
+    goal = problem.objectives[0]
+    value = evaluation.metrics.get(goal.label, math.nan)
+    if not math.isfinite(value):
+        return FAILED
+    return (value if goal.sense == "minimize" else -value) / goal.metric.scale
+
+
+def outcomes(problem: Problem, results: Sequence[Evaluation]) -> Outcomes:
+    """What an optimiser gets to see: finite everywhere."""
+    objective = np.array([minimised(problem, result) for result in results])
+    constraints = np.array(
+        [
+            [
+                result.slacks.get(goal.label, -FAILED * goal.metric.scale) / goal.metric.scale
+                for goal in problem.constraints
+            ]
+            for result in results
+        ]
+    ).reshape(len(results), len(problem.constraints))
+    violation = np.array(
+        [result.violation if math.isfinite(result.violation) else FAILED for result in results]
+    )
+    return Outcomes(objective, constraints, objective + PENALTY * violation)

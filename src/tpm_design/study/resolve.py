@@ -1,0 +1,165 @@
+"""A well-formed study → a Study: every name looked up, every default filled in, everything in SI."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from tpm_design.errors import did_you_mean
+from tpm_design.mechanisms.base import MechanismKind
+from tpm_design.optimizers.base import Optimizer
+from tpm_design.problem import Accuracy, Problem, Variable
+from tpm_design.study.document import Document, read_document
+from tpm_design.study.faults import Faults, shown
+from tpm_design.study.form import parse
+from tpm_design.study.goals import GoalReader
+from tpm_design.study.model import Center, CenterValue, CertifyModel, OptimizerModel, Range, StudyModel
+from tpm_design.study.plain import plain
+from tpm_design.study.quantities import interval
+from tpm_design.study.region import read_region
+from tpm_design.study.registries import Registries, registries
+from tpm_design.study.space import free_center, read_center, read_limits, read_mode, read_parameters
+from tpm_design.study.study import OptimizerSettings, Study
+from tpm_design.study.sweep import SweepReader
+from tpm_design.units import Units, si_unit
+
+
+def load_study(path: str | Path) -> Study:
+    """Reads and checks a study file. Raises StudyError: what is wrong, in which line, what to do."""
+    document = read_document(Path(path))
+    return resolve(document, parse(document), registries())
+
+
+def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
+    """Checks what the names mean and fills in the rest. Raises StudyError."""
+    faults = Faults(document)
+    units = Units(model.units.length, model.units.angle)
+    kind = known.mechanisms.get(model.mechanism.type)
+    if kind is None:
+        faults.stop(
+            ("mechanism", "type"),
+            f"there is no mechanism {shown(model.mechanism.type)}",
+            did_you_mean(model.mechanism.type, known.mechanisms),
+        )
+    region = model.region
+    center = region.center if region else None
+    parameters = read_parameters(model.mechanism, kind, units, faults)
+    limits = read_limits(model.mechanism.limits, kind, units, faults)
+    tolerance = _tolerance(model.certify, kind, units, faults)
+    optimizer = _optimizer(model.optimizer, known.optimizers, faults)
+    faults.raise_if_any()  # the modes and the centre's bounds follow from the parameters
+
+    ranges = {name: interval(quantity) for name, quantity in parameters.items()}
+    modes = read_mode(model.mechanism.mode, kind, ranges, _is_free(center), faults)
+    quantities = dict(parameters)
+    shape = written_region = None
+    if region is not None and center is not None:
+        shape, written_region = read_region(region, units, document.path.parent, faults)
+        if isinstance(center, str):
+            center = free_center(kind, ranges, modes, units, faults)
+        quantities |= read_center(center, kind, modes, units, faults)
+        written_region["center"] = center
+    fixed: dict[str, float | str] = {n: q for n, q in quantities.items() if not isinstance(q, Variable)}
+    variables = [q for q in quantities.values() if isinstance(q, Variable)]
+    if len(modes) == 1:
+        fixed["mode"] = next(iter(modes))
+    else:
+        variables.append(Variable("mode", "mode", values=tuple(modes)))
+
+    reader = GoalReader(known.metrics, kind, units, region is not None, quantities, faults)
+    objectives = reader.read("objectives", model.objectives)
+    constraints = reader.read("constraints", model.constraints)
+    record = reader.read("record", model.record)
+    problem = Problem(
+        kind=kind,
+        fixed=fixed,
+        variables=tuple(variables),
+        modes=modes,
+        limits=limits,
+        region=shape,
+        objectives=tuple(goal for goal, _ in objectives),
+        constraints=tuple(goal for goal, _ in constraints),
+        record=tuple(goal for goal, _ in record),
+        accuracy=Accuracy(model.accuracy.volume, model.accuracy.region_samples),
+    )
+    sweep = written_sweep = None
+    if model.sweep is not None:
+        sweep, written_sweep = SweepReader(problem, units, faults).read(model.sweep)
+    faults.raise_if_any()
+
+    mode = model.mechanism.mode
+    resolved = {
+        "version": model.version,
+        "name": model.name,
+        "units": model.units,
+        "mechanism": {
+            "type": kind.name,
+            "parameters": {name: model.mechanism.parameters[name] for name in parameters},
+            "mode": mode if isinstance(mode, str) else (next(iter(modes.values())) or None),
+            "limits": {name: model.mechanism.limits[name] for name in limits},
+        },
+        "region": written_region,
+        "objectives": [written for _, written in objectives],
+        "constraints": [written for _, written in constraints],
+        "optimizer": model.optimizer,
+        "accuracy": model.accuracy,
+        "certify": {"tolerance": {name: model.certify.tolerance[name] for name in tolerance}},
+        "sweep": written_sweep,
+        "record": [written for _, written in record],
+    }
+    return Study(
+        path=document.path,
+        name=model.name,
+        units=units,
+        problem=problem,
+        optimizer=optimizer,
+        tolerance=tolerance,
+        sweep=sweep,
+        resolved_json=json.dumps(plain(resolved), ensure_ascii=False, allow_nan=False),
+    )
+
+
+def _is_free(center: CenterValue | None) -> bool:
+    """Whether any part of the region's centre is left to the search."""
+    if isinstance(center, Center):
+        return any(isinstance(axis, Range) for axis in (center.x, center.y, center.z))
+    return center == "free"
+
+
+def _tolerance(model: CertifyModel, kind: MechanismKind, units: Units, faults: Faults) -> dict[str, float]:
+    """Manufacturing tolerances, ±, SI, in the mechanism's order of parameters."""
+    for name in model.tolerance:
+        if kind.parameter(name) is None:
+            remedy = did_you_mean(name, kind.parameter_names())
+            faults.add(("certify", "tolerance", name), f"{kind.name} has no parameter {shown(name)}", remedy)
+    found: dict[str, float] = {}
+    for name in kind.parameter_names():
+        parameter = kind.parameter(name)
+        if parameter is None or name not in model.tolerance:
+            continue
+        if name != parameter.name and parameter.name in model.tolerance:
+            faults.add(
+                ("certify", "tolerance", name),
+                f"{parameter.name} sets all limbs and {name} one of them",
+                f"Keep one: {parameter.name} holds for each limb by itself.",
+            )
+        found[name] = units.to_si(model.tolerance[name], si_unit(parameter.dimension))
+    return found
+
+
+def _optimizer(model: OptimizerModel, methods: Mapping[str, Optimizer], faults: Faults) -> OptimizerSettings:
+    """The method and the local method that polishes its result."""
+    if model.method not in methods:
+        faults.add(
+            ("optimizer", "method"),
+            f"there is no method {shown(model.method)}",
+            did_you_mean(model.method, methods),
+        )
+    local = [name for name, method in methods.items() if not method.abilities.whole_space]
+    if model.polish is not None and model.polish not in local:
+        what = "is not a local method" if model.polish in methods else "does not exist"
+        faults.add(
+            ("optimizer", "polish"), f"{shown(model.polish)} {what}", did_you_mean(model.polish, local)
+        )
+    return OptimizerSettings(model.method, model.budget, model.seed, model.polish)

@@ -1,0 +1,74 @@
+"""A study, ready to run."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from tpm_design.errors import UsageError
+from tpm_design.problem import Problem
+from tpm_design.study.sweep import Sweep
+from tpm_design.units import Units
+
+
+@dataclass(frozen=True)
+class OptimizerSettings:
+    """Which method searches, for how long, and which local method improves what it found."""
+
+    method: str
+    budget: int
+    seed: int
+    polish: str | None
+
+
+@dataclass(frozen=True)
+class Study:
+    """A validated study. ``problem`` is in SI units; ``resolved()`` in the study's own.
+
+    ``tolerance``: manufacturing tolerances by parameter name, ±, SI. Studies that ask the same are equal,
+    wherever their files lie.
+    """
+
+    path: Path = field(compare=False)
+    name: str
+    units: Units
+    problem: Problem
+    optimizer: OptimizerSettings
+    tolerance: Mapping[str, float]
+    sweep: Sweep | None
+    resolved_json: str = field(repr=False)
+
+    def resolved(self) -> dict[str, Any]:
+        """Everything explicit, in the study's units, as plain data that is itself a study."""
+        data: dict[str, Any] = json.loads(self.resolved_json)
+        return data
+
+    @property
+    def study_hash(self) -> str:
+        """SHA-256 of the resolved study: equal for studies that ask the same, however they are written."""
+        canonical = json.dumps(self.resolved(), sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+        return hashlib.sha256(canonical.encode()).hexdigest()
+
+    def searched_with(self, *, seed: int | None = None, budget: int | None = None) -> Study:
+        """The same study with another seed or budget. Raises UsageError for values a study cannot have."""
+        if seed is not None and not 0 <= seed <= 2**32 - 1:
+            raise UsageError(
+                f"the seed cannot be {seed}", remedy=f"Choose a whole number from 0 to {2**32 - 1}."
+            )
+        if budget is not None and not 1 <= budget <= 10**9:
+            raise UsageError(
+                f"the budget cannot be {budget}", remedy="Choose a whole number from 1 to 1000000000."
+            )
+        given = {name: value for name, value in (("seed", seed), ("budget", budget)) if value is not None}
+        data = self.resolved()
+        data["optimizer"] |= given
+        optimizer = replace(
+            self.optimizer,
+            seed=self.optimizer.seed if seed is None else seed,
+            budget=self.optimizer.budget if budget is None else budget,
+        )
+        return replace(self, optimizer=optimizer, resolved_json=json.dumps(data, ensure_ascii=False))

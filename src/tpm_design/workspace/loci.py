@@ -1,0 +1,361 @@
+"""Euclidean distance from a region to a singularity locus within the closed reach of the mode.
+
+The locus is the zero set of one determinant. Its signed distance to the region is positive outside and
+negative inside, so the least one over the locus is the distance to the region or, where the locus cuts
+it, minus the depth it comes to. Candidates come from feelers along the region's outward normals (the
+way along a feeler is the distance) and from the lattice inside; each is then slid along the locus to
+the nearest point.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tpm_design.mechanisms.pointwise import reach_row, singularity_row
+from tpm_design.workspace.indices import determinant_at
+from tpm_design.workspace.poses import workspace_margin
+from tpm_design.workspace.region_geometry import PlacedRegion, nearest, signed_distance
+
+CANDIDATES = 4
+LEVELS = 200
+SLIDES = 200
+GROWTH = 1.12
+REACH_TOLERANCE = 1e-9
+FINEST_STEP = 1e-6
+ERROR_FLOOR = 1e-5
+
+
+@dataclass(frozen=True)
+class LocusDistance:
+    """``value`` (m): distance, or minus the penetration depth. ``error`` (m). ``pose``: the locus point,
+    None if no locus was met within reach (``value`` is then +inf)."""
+
+    value: float
+    error: float
+    pose: tuple[float, float, float] | None
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _along(geometry, mode, part, base, normal, t):  # type: ignore[no-untyped-def]
+    return determinant_at(
+        geometry, mode, part, base[0] + t * normal[0], base[1] + t * normal[1], base[2] + t * normal[2]
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _crossing(geometry, mode, part, base, normal, low, high):  # type: ignore[no-untyped-def]
+    """Way along a feeler at which the determinant changes sign, by bisection."""
+    positive = _along(geometry, mode, part, base, normal, low) > 0.0
+    for _ in range(48):
+        t = 0.5 * (low + high)
+        if (_along(geometry, mode, part, base, normal, t) > 0.0) == positive:
+            low = t
+        else:
+            high = t
+    return 0.5 * (low + high)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _exit(geometry, mode, base, normal, low, high):  # type: ignore[no-untyped-def]
+    """Last way along a feeler that is still reachable, between ``low`` (reachable) and ``high``."""
+    for _ in range(26):
+        t = 0.5 * (low + high)
+        margin = workspace_margin(
+            geometry, mode, base[0] + t * normal[0], base[1] + t * normal[1], base[2] + t * normal[2]
+        )
+        if margin >= 0.0:
+            low = t
+        else:
+            high = t
+    return low
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _march(geometry, mode, determinant_count, part, bases, normals, step, limit):  # type: ignore[no-untyped-def]
+    """Ways (F,) along the feelers to the first locus of one determinant; +inf where none was met before
+    the march ended: one level after the first was met, or at ``limit``.
+
+    Levels are spaced ever wider. The determinants continue past the leg space (the elbow term is clamped
+    there), so a crossing beyond reach is found too, and discarded.
+    """
+    count = bases.shape[0]
+    ways = np.full(count, math.inf)
+    x, y, z = bases[:, 0].copy(), bases[:, 1].copy(), bases[:, 2].copy()
+    legs, side = np.empty(count), np.empty(count)
+    before, here = np.empty((determinant_count, count)), np.empty((determinant_count, count))
+    singularity_row(geometry, mode, x, y, z, before)
+    was_inside = np.ones(count, np.bool_)
+    low, levels_left = 0.0, LEVELS
+    while levels_left > 0 and low < limit:
+        levels_left -= 1
+        high = low + step
+        for n in range(count):
+            x[n] = bases[n, 0] + high * normals[n, 0]
+            y[n] = bases[n, 1] + high * normals[n, 1]
+            z[n] = bases[n, 2] + high * normals[n, 2]
+        singularity_row(geometry, mode, x, y, z, here)
+        reach_row(geometry, mode, x, y, z, legs, side)
+        for n in range(count):
+            inside = legs[n] >= 0.0 and side[n] >= 0.0
+            if ways[n] == math.inf and (inside or was_inside[n]):
+                base = (bases[n, 0], bases[n, 1], bases[n, 2])
+                normal = (normals[n, 0], normals[n, 1], normals[n, 2])
+                flipped = (here[part, n] > 0.0) != (before[part, n] > 0.0)
+                ways[n] = _meeting(geometry, mode, part, base, normal, low, high, flipped, inside)
+                if ways[n] < math.inf:
+                    levels_left = min(levels_left, 1)
+            was_inside[n] = inside
+        before, here = here, before
+        low = high
+        step *= GROWTH
+    return ways
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _meeting(geometry, mode, part, base, normal, low, high, flipped, inside):  # type: ignore[no-untyped-def]
+    """Way at which a feeler meets the locus between two levels within closed reach, else +inf."""
+    if not flipped:
+        if inside:
+            return math.inf
+        # a locus may hug the shell that the feeler leaves through
+        high = _exit(geometry, mode, base, normal, low, high)
+        start = _along(geometry, mode, part, base, normal, low)
+        if (_along(geometry, mode, part, base, normal, high) > 0.0) == (start > 0.0):
+            return math.inf
+    t = _crossing(geometry, mode, part, base, normal, low, high)
+    margin = workspace_margin(
+        geometry, mode, base[0] + t * normal[0], base[1] + t * normal[1], base[2] + t * normal[2]
+    )
+    return t if margin >= -REACH_TOLERANCE else math.inf
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gradient(geometry, mode, part, x, y, z, step):  # type: ignore[no-untyped-def]
+    gx = determinant_at(geometry, mode, part, x + step, y, z) - determinant_at(
+        geometry, mode, part, x - step, y, z
+    )
+    gy = determinant_at(geometry, mode, part, x, y + step, z) - determinant_at(
+        geometry, mode, part, x, y - step, z
+    )
+    gz = determinant_at(geometry, mode, part, x, y, z + step) - determinant_at(
+        geometry, mode, part, x, y, z - step
+    )
+    size = math.sqrt(gx * gx + gy * gy + gz * gz)
+    return gx, gy, gz, size
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _onto_locus(geometry, mode, part, point, normal, width):  # type: ignore[no-untyped-def]
+    """(found, x, y, z): the point moved along ``normal`` onto the locus, by at most about ``width``."""
+    x, y, z = point
+    t0, t1 = 0.0, 0.01 * width
+    g0 = determinant_at(geometry, mode, part, x, y, z)
+    if abs(g0) <= 1e-12:
+        return True, x, y, z
+    g1 = determinant_at(geometry, mode, part, x + t1 * normal[0], y + t1 * normal[1], z + t1 * normal[2])
+    for _ in range(12):
+        if abs(g0) < abs(g1):
+            t0, t1, g0, g1 = t1, t0, g1, g0
+        if abs(g1) <= 1e-14 or g1 == g0:
+            break
+        t2 = t1 - g1 * (t1 - t0) / (g1 - g0)
+        if not abs(t2) <= 2.0 * width:
+            return False, x, y, z
+        t0, g0 = t1, g1
+        t1 = t2
+        g1 = determinant_at(geometry, mode, part, x + t1 * normal[0], y + t1 * normal[1], z + t1 * normal[2])
+    return abs(g1) <= 1e-10, x + t1 * normal[0], y + t1 * normal[1], z + t1 * normal[2]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _try(geometry, mode, region, part, point, normal, width, best):  # type: ignore[no-untyped-def]
+    found, x, y, z = _onto_locus(geometry, mode, part, point, normal, width)
+    if found and workspace_margin(geometry, mode, x, y, z) >= -REACH_TOLERANCE:
+        distance = signed_distance(region, x, y, z)
+        if distance < best:
+            return distance, x, y, z
+    return best, math.nan, math.nan, math.nan
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore[no-untyped-def]
+    """Least signed distance along the locus from ``start``: (distance, x, y, z).
+
+    First the full step to the foot of the nearest region point in the tangent plane, then a compass in
+    it that turns after each failure, so that no edge of the reach stops it for good.
+    """
+    x, y, z = start
+    turn, failures = 0.0, 0
+    difference = 1e-6 * step
+    gx, gy, gz, size = _gradient(geometry, mode, part, x, y, z, difference)
+    if not size > 0.0:
+        return math.inf, x, y, z
+    found, x, y, z = _onto_locus(geometry, mode, part, start, (gx / size, gy / size, gz / size), step)
+    if not found or workspace_margin(geometry, mode, x, y, z) < -REACH_TOLERANCE:
+        return math.inf, x, y, z
+    best = signed_distance(region, x, y, z)
+    for _ in range(SLIDES):
+        if step <= smallest:
+            break
+        gx, gy, gz, size = _gradient(geometry, mode, part, x, y, z, difference)
+        if not size > 0.0:
+            break
+        normal = (gx / size, gy / size, gz / size)
+        u = nearest(region, x, y, z)
+        dx, dy, dz = u[0] - x, u[1] - y, u[2] - z
+        along = dx * normal[0] + dy * normal[1] + dz * normal[2]
+        dx, dy, dz = dx - along * normal[0], dy - along * normal[1], dz - along * normal[2]
+        way = math.sqrt(dx * dx + dy * dy + dz * dz)
+        if way <= smallest:
+            # the nearest region point lies along the normal: stationary
+            break
+        trial = _try(geometry, mode, region, part, (x + dx, y + dy, z + dz), normal, max(way, step), best)
+        moved = trial[0] < best
+        if not moved:
+            ax, ay, az = _perpendicular(normal)
+            bx = normal[1] * az - normal[2] * ay
+            by = normal[2] * ax - normal[0] * az
+            bz = normal[0] * ay - normal[1] * ax
+            for quarter in range(4):
+                c = step * math.cos(turn + 0.5 * math.pi * quarter)
+                s = step * math.sin(turn + 0.5 * math.pi * quarter)
+                point = (x + c * ax + s * bx, y + c * ay + s * by, z + c * az + s * bz)
+                trial = _try(geometry, mode, region, part, point, normal, step, best)
+                if trial[0] < best:
+                    moved = True
+                    break
+        if moved:
+            gain = best - trial[0]
+            best, x, y, z = trial
+            failures = 0
+            if gain < 1e-4 * step:
+                failures = 2
+        else:
+            failures += 1
+            turn += 2.399963229728653
+        if failures >= 2:
+            step *= 0.35
+            failures = 0
+    return best, x, y, z
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _perpendicular(normal):  # type: ignore[no-untyped-def]
+    """A unit vector perpendicular to a unit vector."""
+    nx, ny, nz = normal
+    if abs(nx) <= abs(ny) and abs(nx) <= abs(nz):
+        size = math.sqrt(ny * ny + nz * nz)
+        return 0.0, -nz / size, ny / size
+    if abs(ny) <= abs(nz):
+        size = math.sqrt(nx * nx + nz * nz)
+        return nz / size, 0.0, -nx / size
+    size = math.sqrt(nx * nx + ny * ny)
+    return -ny / size, nx / size, 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _best_slide(geometry, mode, region, part, starts, distances, stride, step, smallest):  # type: ignore[no-untyped-def]
+    """Slide from the nearest starts that lie apart; ``stride`` skips starts."""
+    best, bx, by, bz = math.inf, math.nan, math.nan, math.nan
+    chosen = np.full(CANDIDATES, -1, np.int64)
+    for k in range(CANDIDATES):
+        pick = -1
+        for n in range(0, distances.size, stride):
+            if not distances[n] < math.inf or (pick >= 0 and distances[n] >= distances[pick]):
+                continue
+            apart = True
+            for j in range(k):
+                m = chosen[j]
+                square = 0.0
+                for axis in range(3):
+                    square += (starts[n, axis] - starts[m, axis]) ** 2
+                apart = apart and square > 4.0 * step * step
+            if apart:
+                pick = n
+        if pick < 0:
+            break
+        chosen[k] = pick
+        start = (starts[pick, 0], starts[pick, 1], starts[pick, 2])
+        found = _slide(geometry, mode, region, part, start, step, smallest)
+        if found[0] < best:
+            best, bx, by, bz = found
+    return best, bx, by, bz
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _signed_distances(region, points):  # type: ignore[no-untyped-def]
+    out = np.empty(points.shape[0])
+    for n in range(points.shape[0]):
+        out[n] = signed_distance(region, points[n, 0], points[n, 1], points[n, 2])
+    return out
+
+
+def locus_distance(
+    geometry: object,
+    signs: object,
+    region: PlacedRegion,
+    part: int,
+    *,
+    determinants: NDArray[np.float64],
+    grid: NDArray[np.float64],
+    feeler_points: NDArray[np.float64],
+    feeler_normals: NDArray[np.float64],
+    known: NDArray[np.float64],
+    spacing: float,
+    limit: float,
+) -> LocusDistance:
+    """Distance to the locus of one determinant, for a region that is reachable throughout.
+
+    ``grid`` (I, J, K, 3): the region's lattice; ``determinants`` (D, I, J, K) on it; feelers as of
+    ``sampling.feelers``; ``known`` (N, 3): points of the locus found elsewhere; ``spacing`` (m) of the
+    lattice; ``limit`` (m) at which feelers end.
+    """
+    inner = _lattice_crossings(determinants[part], grid)
+    ways = _march(geometry, signs, len(determinants), part, feeler_points, feeler_normals, 0.5 * spacing, limit)
+    outer = np.isfinite(ways)
+    starts = np.vstack([inner, feeler_points[outer] + ways[outer, None] * feeler_normals[outer], known])
+    return _nearest_locus(geometry, signs, region, part, starts, spacing)
+
+
+def _nearest_locus(
+    geometry: object,
+    signs: object,
+    region: PlacedRegion,
+    part: int,
+    starts: NDArray[np.float64],
+    spacing: float,
+) -> LocusDistance:
+    if not len(starts):
+        return LocusDistance(math.inf, 0.0, None)
+    distances = _signed_distances(region, starts)
+    smallest = FINEST_STEP * spacing
+    fine, coarse = (
+        _best_slide(geometry, signs, region, part, starts, distances, stride, 0.5 * spacing, smallest)
+        for stride in (1, 2)
+    )
+    best = min(fine, coarse)
+    if not best[0] < math.inf:
+        return LocusDistance(math.inf, 0.0, None)
+    pose = (float(best[1]), float(best[2]), float(best[3]))
+    missed = abs(fine[0] - coarse[0]) if coarse[0] < math.inf else abs(float(best[0]))
+    return LocusDistance(float(best[0]), missed + ERROR_FLOOR * spacing, pose)
+
+
+def _lattice_crossings(values: NDArray[np.float64], grid: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Poses (N, 3) between lattice neighbours of opposite sign, by linear interpolation."""
+    found = [np.empty((0, 3))]
+    for axis in range(3):
+        count = values.shape[axis]
+        if count < 2:
+            continue
+        a, b = np.take(values, range(count - 1), axis), np.take(values, range(1, count), axis)
+        p, q = np.take(grid, range(count - 1), axis), np.take(grid, range(1, count), axis)
+        changed = (a > 0.0) != (b > 0.0)
+        share = (a[changed] / (a[changed] - b[changed]))[:, None]
+        found.append(p[changed] + share * (q[changed] - p[changed]))
+    return np.vstack(found)

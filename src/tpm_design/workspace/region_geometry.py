@@ -1,0 +1,130 @@
+"""Signed distance to a placed region and the nearest of its points, for compiled code."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere
+
+BOX, CYLINDER, ELLIPSOID, POINTS = 0, 1, 2, 3
+
+
+class PlacedRegion(NamedTuple):
+    """A region at its place. ``half``: half edges, (radius, radius, half height) or half axes (m)."""
+
+    form: int
+    centre: tuple[float, float, float]
+    half: tuple[float, float, float]
+    points: NDArray[np.float64]
+
+
+def place(shape: Shape, centre: tuple[float, float, float]) -> PlacedRegion:
+    """The region ``shape`` with its centre at ``centre`` (m)."""
+    form, half = {
+        Box: lambda s: (BOX, tuple(0.5 * edge for edge in s.size)),
+        Cylinder: lambda s: (CYLINDER, (s.radius, s.radius, 0.5 * s.height)),
+        Sphere: lambda s: (ELLIPSOID, (s.radius,) * 3),
+        Ellipsoid: lambda s: (ELLIPSOID, s.semi_axes),
+        Points: lambda s: (POINTS, tuple(np.abs(np.asarray(s.points)).max(axis=0).tolist())),
+    }[type(shape)](shape)
+    points = np.asarray(shape.points if isinstance(shape, Points) else (), dtype=np.float64).reshape(-1, 3)
+    at = (float(centre[0]), float(centre[1]), float(centre[2]))
+    return PlacedRegion(form, at, (float(half[0]), float(half[1]), float(half[2])), points + np.asarray(at))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _ellipsoid_foot(half, x, y, z):  # type: ignore[no-untyped-def]
+    """Nearest point of the ellipsoid's surface to a point (about its centre).
+
+    The foot is half²·p/(half² + t) for the root t > −min half² of Σ (half·p/(half² + t))² = 1.
+    """
+    a, b, c = half[0] * half[0], half[1] * half[1], half[2] * half[2]
+    least = min(a, min(b, c))
+    size = math.sqrt(x * x + y * y + z * z)
+    if size <= 1e-14 * math.sqrt(least):
+        # the centre: the end of the shortest half axis
+        if least == a:
+            return half[0], 0.0, 0.0
+        return (0.0, half[1], 0.0) if least == b else (0.0, 0.0, half[2])
+    if a == b and b == c:
+        return half[0] * x / size, half[0] * y / size, half[0] * z / size
+    # convex and decreasing in t: Newton from the left never overshoots, bisection guards the rest
+    low, high = -least * (1.0 - 1e-14), math.sqrt(max(a, max(b, c))) * size
+    t = 0.0
+    for _ in range(100):
+        u, v, w = half[0] * x / (a + t), half[1] * y / (b + t), half[2] * z / (c + t)
+        value = u * u + v * v + w * w - 1.0
+        if value > 0.0:
+            low = t
+        else:
+            high = t
+        slope = -2.0 * (u * u / (a + t) + v * v / (b + t) + w * w / (c + t))
+        following = t - value / slope
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        if abs(following - t) <= 1e-16 * least or high - low <= 1e-16 * least:
+            break
+        t = following
+    return a * x / (a + t), b * y / (b + t), c * z / (c + t)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _nearest_index(points, x, y, z):  # type: ignore[no-untyped-def]
+    best, least = 0, math.inf
+    for n in range(points.shape[0]):
+        square = (points[n, 0] - x) ** 2 + (points[n, 1] - y) ** 2 + (points[n, 2] - z) ** 2
+        if square < least:
+            best, least = n, square
+    return best, math.sqrt(least)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def signed_distance(region, x, y, z):  # type: ignore[no-untyped-def]
+    """Distance (m) to the region's surface, negative inside."""
+    if region.form == POINTS:
+        _, distance = _nearest_index(region.points, x, y, z)
+        return distance
+    dx, dy, dz = x - region.centre[0], y - region.centre[1], z - region.centre[2]
+    half = region.half
+    if region.form == ELLIPSOID:
+        u, v, w = _ellipsoid_foot(half, dx, dy, dz)
+        distance = math.sqrt((dx - u) ** 2 + (dy - v) ** 2 + (dz - w) ** 2)
+        inside = (dx / half[0]) ** 2 + (dy / half[1]) ** 2 + (dz / half[2]) ** 2 <= 1.0
+        return -distance if inside else distance
+    if region.form == CYLINDER:
+        ex, ey = math.sqrt(dx * dx + dy * dy) - half[0], abs(dz) - half[2]
+        outside = math.sqrt(max(ex, 0.0) ** 2 + max(ey, 0.0) ** 2)
+        return outside if outside > 0.0 else max(ex, ey)
+    ex, ey, ez = abs(dx) - half[0], abs(dy) - half[1], abs(dz) - half[2]
+    outside = math.sqrt(max(ex, 0.0) ** 2 + max(ey, 0.0) ** 2 + max(ez, 0.0) ** 2)
+    return outside if outside > 0.0 else max(ex, max(ey, ez))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def nearest(region, x, y, z):  # type: ignore[no-untyped-def]
+    """The region's point nearest to a pose; the pose itself inside."""
+    if region.form == POINTS:
+        n, _ = _nearest_index(region.points, x, y, z)
+        return region.points[n, 0], region.points[n, 1], region.points[n, 2]
+    cx, cy, cz = region.centre
+    dx, dy, dz = x - cx, y - cy, z - cz
+    half = region.half
+    if region.form == ELLIPSOID:
+        if (dx / half[0]) ** 2 + (dy / half[1]) ** 2 + (dz / half[2]) ** 2 <= 1.0:
+            return x, y, z
+        u, v, w = _ellipsoid_foot(half, dx, dy, dz)
+        return cx + u, cy + v, cz + w
+    if region.form == CYLINDER:
+        size = math.sqrt(dx * dx + dy * dy)
+        shrink = half[0] / size if size > half[0] else 1.0
+        return cx + shrink * dx, cy + shrink * dy, cz + min(half[2], max(-half[2], dz))
+    return (
+        cx + min(half[0], max(-half[0], dx)),
+        cy + min(half[1], max(-half[1], dy)),
+        cz + min(half[2], max(-half[2], dz)),
+    )
