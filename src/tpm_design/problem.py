@@ -81,12 +81,14 @@ class Problem:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """One evaluated design, SI units. ``slacks``: constraint label → signed distance to its bound."""
+    """One evaluated design, SI units. ``slacks``: constraint label → signed distance to its bound, the
+    least of its ``pieces``: one number, or a fixed number of them, smoother in the design."""
 
     design: Design
     metrics: Mapping[str, float]
     errors: Mapping[str, float]
     slacks: Mapping[str, float]
+    pieces: Mapping[str, tuple[float, ...]]
     notes: Mapping[str, str]
     violation: float
     status: Literal["feasible", "infeasible", "failed"]
@@ -108,10 +110,11 @@ def evaluate(problem: Problem, design: Design) -> Evaluation:
     except (ParameterError, ArithmeticError) as error:
         reason = error.what if isinstance(error, ParameterError) else str(error)
         return Evaluation(
-            dict(design), {}, {}, {}, {}, math.inf, "failed", reason, time.perf_counter() - began
+            dict(design), {}, {}, {}, {}, {}, math.inf, "failed", reason, time.perf_counter() - began
         )
     undefined = {label: m.notes[UNDEFINED] for label, m in measurements.items() if UNDEFINED in m.notes}
-    slacks = {goal.label: slack(goal, measurements[goal.label]) for goal in problem.constraints}
+    pieces = {goal.label: slack_pieces(goal, measurements[goal.label]) for goal in problem.constraints}
+    slacks = {label: min(values) for label, values in pieces.items()}
     short = {
         goal.label: max(0.0, -slacks[goal.label]) / goal.metric.scale for goal in problem.constraints
     }
@@ -125,8 +128,9 @@ def evaluate(problem: Problem, design: Design) -> Evaluation:
         metrics={label: m.value for label, m in measurements.items()},
         errors={label: m.error for label, m in measurements.items()},
         slacks=slacks,
+        pieces=pieces,
         notes={
-            f"{label} {key}": note
+            f"{label}_{key}": note
             for label, m in measurements.items()
             for key, note in m.notes.items()
             if key != UNDEFINED
@@ -153,17 +157,20 @@ def design_context(problem: Problem, design: Design) -> Context:
     return Context(mechanism, mode, region, problem.accuracy.volume, problem.accuracy.region_samples)
 
 
-def slack(goal: Goal, measurement: Measurement) -> float:
-    """Signed distance of a constraint to its bound, less the numeric error: met where ≥ 0. In the
-    metric's unit, or as the metric defines it where its value is flat."""
+def slack_pieces(goal: Goal, measurement: Measurement) -> tuple[float, ...]:
+    """Signed distances of a constraint to its bound, less the numeric error: met where all are ≥ 0. In the
+    metric's unit, or as the metric defines them where its value is flat."""
     if UNDEFINED in measurement.notes:
-        return -UNDEFINED_VIOLATION * goal.metric.scale
-    value, error = measurement.value, measurement.error
-    below = math.inf if goal.minimum is None else value - error - goal.minimum
-    above = math.inf if goal.maximum is None else goal.maximum - value - error
-    least = min(below, above)
+        return (-UNDEFINED_VIOLATION * goal.metric.scale,)
     if measurement.full_slack is not None and goal.minimum is not None and goal.minimum >= 1.0:
-        return measurement.full_slack
+        return measurement.pieces or (measurement.full_slack,)
+    return tuple(_slack(goal, measurement, value) for value in measurement.pieces or (measurement.value,))
+
+
+def _slack(goal: Goal, measurement: Measurement, value: float) -> float:
+    below = math.inf if goal.minimum is None else value - measurement.error - goal.minimum
+    above = math.inf if goal.maximum is None else goal.maximum - value - measurement.error
+    least = min(below, above)
     return least + measurement.depth if least < 0.0 else least
 
 

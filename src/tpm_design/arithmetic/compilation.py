@@ -12,7 +12,8 @@ from typing import Any
 from tpm_design.arithmetic import kernel_cache  # noqa: F401  (before Numba)
 
 # isort: split
-from numba import types
+from numba import njit, types
+from numba.core.registry import CPUDispatcher
 from numba.extending import overload
 
 Function = Callable[..., Any]
@@ -22,6 +23,25 @@ FAST_MATH = {"contract", "reassoc", "nsz", "arcp", "afn"}
 
 FAST: Any = {"fastmath": FAST_MATH, "error_model": "numpy", "forceinline": True}
 STRICT: Any = {"fastmath": False, "error_model": "numpy", "forceinline": False}
+
+
+class _InnerFunction(CPUDispatcher):  # type: ignore[misc]
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        # it has no entry from Python: calling it as other dispatchers are called would crash
+        raise TypeError(f"{self.py_func.__name__} serves compiled code only")
+
+
+def kernel(function: Function) -> Any:
+    """Compile a function that Python calls, and keep it on disk."""
+    return njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function)
+
+
+def inner(function: Function) -> Any:
+    """Compile a function that only compiled functions call: without an entry from Python, which takes as
+    long to compile as a small function. It is kept on disk inside the kernels that call it."""
+    compiled = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    compiled.__class__ = _InnerFunction
+    return compiled
 
 
 def is_number(kind: Any) -> bool:

@@ -20,6 +20,7 @@ def mechanism_kind(name: str) -> MechanismKind:
     return MECHANISMS[name]
 
 
-def build_mechanism(name: str, parameters: Mapping[str, float | Sequence[float]]) -> Mechanism:
-    """A mechanism from its name and SI parameters, without joint limits."""
+def mechanism(name: str, **parameters: float | Sequence[float]) -> Mechanism:
+    """A mechanism from its name and dimensions in SI units: one number for all limbs, ``f=(…)`` where they
+    differ, or ``f1``, ``f2``, ``f3``. Raises ParameterError on an unknown, missing or impossible value."""
     return mechanism_kind(name).build(parameters, {})

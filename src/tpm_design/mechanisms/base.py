@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 Dimension = Literal["length", "angle", "ratio"]
 Domain = Literal["positive", "non-negative", "non-zero", "any"]
 
+ModeCandidates = Callable[[Mapping[str, tuple[float, float]], bool], tuple[dict[str, str], ...]]
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -67,6 +69,8 @@ class MechanismKind:
     ``build(parameters, limits)``: SI values by name → a mechanism. ``farthest_reach(ranges)``: a bound
     (m) on the distance of any reachable pose from the origin, from the (lowest, highest) SI value of
     every parameter name that is set. ``example``: SI values of a machine that works, for new studies.
+    ``mode_candidates(ranges, center_free)``: sign strings of one working mode of each set that symmetry
+    makes equal for every design of the ranges; None: all modes count as different.
     """
 
     name: str
@@ -84,6 +88,7 @@ class MechanismKind:
     build: Callable[[Mapping[str, Any], Mapping[str, Any]], Mechanism]
     farthest_reach: Callable[[Mapping[str, tuple[float, float]]], float]
     limb_count: int = 3
+    mode_candidates: ModeCandidates | None = None
 
     def parameter(self, name: str) -> Parameter | None:
         """The parameter that ``name`` sets (``f`` or ``f2``), or None."""

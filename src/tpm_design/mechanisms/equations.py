@@ -40,10 +40,11 @@ def actuators(geometry: Any, mode: Any, motor: Any, x: Any, y: Any, z: Any) -> A
     raise NotImplementedError
 
 
-def closure(geometry: Any, motor: Any, q: Any, x: Any, y: Any, z: Any) -> Any:
+def closure(geometry: Any, motor: Any, q: Any, chart: Any, u: Any, v: Any, w: Any) -> Any:
     """Three residuals that vanish at every pose where the limbs close for actuator coordinates ``q``, in
-    whichever working mode. They may vanish elsewhere too. ``motor`` as in ``velocity_map``; only x, y, z
-    may be other than floats."""
+    whichever working mode, and a tuple of numbers that are > 0 only where the pose is none such. Both may
+    allow too much. The pose is given by coordinates u, v, w in a ``chart`` of the mechanism's own, a tuple
+    of floats; u, v, w alone may be other than floats. ``motor`` as in ``velocity_map``."""
     raise NotImplementedError
 
 

@@ -13,46 +13,58 @@ Int. J. Robotics Research 23(3), 2004.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from tpm_design.arithmetic import Interval, variables
+from tpm_design.arithmetic import Interval, inner, kernel, variables
 from tpm_design.errors import ParameterError
-from tpm_design.mechanisms import equations
+from tpm_design.mechanisms import equations, pointwise
+from tpm_design.mechanisms.mechanism import FloatArray, Mechanism
 from tpm_design.mechanisms.velocity import adjugate_columns
 
-# narrower boxes (as a share of the widest) are kept as cells that may hold an assembly at a singularity
+# boxes that take less than this share of their chart are kept as cells that may hold a singular assembly
 CELL = 1e-7
 # relative widening of a box before the Newton step, so that an assembly on a shared face is proved as well
 OVERLAP = 0.02
-BOX_LIMIT = 400_000
-CELL_LIMIT = 20_000
-# assemblies nearer to each other than this share of the widest box are one
-APART = 1e-9
+BOX_LIMIT = 300_000
+CANDIDATE_LIMIT = 5_000
+# each halving adds one box to the stack, and none is halved below CELL
+STACK = 128
+# candidates nearer to each other than this share of the reach are one assembly …
+SAME = 1e-9
+# … and different assemblies nearer than this are a singular cluster
+APART = 1e-6
+# relative, from 1 rad up: the inverse map loses half its digits where a limb is stretched
+AGREEMENT = 1e-6
+
+Chart = tuple[float, ...]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _middle(interval):  # type: ignore[no-untyped-def]
     return 0.5 * (interval.lo + interval.hi)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _residuals(geometry, motor, q, x, y, z):  # type: ignore[no-untyped-def]
-    return equations.closure(geometry, motor, q, x, y, z)
+@inner
+def _enclosures(geometry, motor, q, chart, box):  # type: ignore[no-untyped-def]
+    """Bounds over ``box`` (3, 2) of the residuals, rows of bounds of their derivatives, and whether the box
+    may hold an assembly for all that these bounds tell."""
+    u, v, w = variables(
+        (Interval(box[0, 0], box[0, 1]), Interval(box[1, 0], box[1, 1]), Interval(box[2, 0], box[2, 1]))
+    )
+    (a, b, c), excesses = equations.closure(geometry, motor, q, chart, u, v, w)
+    possible = True
+    for residual in (a, b, c):
+        possible = possible and residual.value.lo <= 0.0 <= residual.value.hi
+    for excess in excesses:
+        possible = possible and excess.value.lo <= AGREEMENT
+    return (a.value, b.value, c.value), (a.derivatives, b.derivatives, c.derivatives), possible
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _slopes(geometry, motor, q, x, y, z):  # type: ignore[no-untyped-def]
-    """Rows of bounds of the residuals' derivatives over a box."""
-    u, v, w = variables((x, y, z))
-    first, second, third = equations.closure(geometry, motor, q, u, v, w)
-    return first.derivatives, second.derivatives, third.derivatives
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _inverse_of_middle(rows):  # type: ignore[no-untyped-def]
     """Inverse of the matrix of midpoints, by rows; not finite where that has no inverse."""
     a, b, c = rows
@@ -69,7 +81,7 @@ def _inverse_of_middle(rows):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _newton_bound(k, inverse, rows, values, centre, box):  # type: ignore[no-untyped-def]
     """Bounds of coordinate ``k`` of every zero in the box, from the ``k``-th preconditioned equation."""
     weights = inverse[k]
@@ -80,38 +92,27 @@ def _newton_bound(k, inverse, rows, values, centre, box):  # type: ignore[no-unt
         if j == k:
             pivot = slope
         else:
-            total = total + slope * Interval(box[j, 0] - centre[j], box[j, 1] - centre[j])
-    return centre[k] - total / pivot
+            total = total + slope * Interval(box[j, 0] - centre[j, 0], box[j, 1] - centre[j, 0])
+    return centre[k, 0] - total / pivot
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _newton_step(geometry, motor, q, box, limits, wide, centre):  # type: ignore[no-untyped-def]
-    """Narrow ``box`` (3, 2) in place. −1: it holds no zero; 1: a zero is proved unique near it; else 0."""
+@inner
+def _newton_step(geometry, motor, q, chart, box, limits, wide, centre):  # type: ignore[no-untyped-def]
+    """Narrow ``box`` (3, 2) in place. −1: it holds no zero; 1: ``wide`` holds just one; else 0."""
     for k in range(3):
         slack = OVERLAP * (box[k, 1] - box[k, 0])
         wide[k, 0] = max(limits[k, 0], box[k, 0] - slack)
         wide[k, 1] = min(limits[k, 1], box[k, 1] + slack)
-        centre[k] = 0.5 * (wide[k, 0] + wide[k, 1])
-    rows = _slopes(
-        geometry,
-        motor,
-        q,
-        Interval(wide[0, 0], wide[0, 1]),
-        Interval(wide[1, 0], wide[1, 1]),
-        Interval(wide[2, 0], wide[2, 1]),
-    )
+        centre[k, 0] = 0.5 * (wide[k, 0] + wide[k, 1])
+        centre[k, 1] = centre[k, 0]
+    values, rows, possible = _enclosures(geometry, motor, q, chart, wide)
+    if not possible:
+        return -1
     inverse = _inverse_of_middle(rows)
     for row in inverse:
         if not math.isfinite(row[0] + row[1] + row[2]):
             return 0
-    values = _residuals(
-        geometry,
-        motor,
-        q,
-        Interval(centre[0], centre[0]),
-        Interval(centre[1], centre[1]),
-        Interval(centre[2], centre[2]),
-    )
+    values, _, _ = _enclosures(geometry, motor, q, chart, centre)
     inside = 0
     for k in range(3):
         bound = _newton_bound(k, inverse, rows, values, centre, wide)
@@ -131,117 +132,156 @@ def _newton_step(geometry, motor, q, box, limits, wide, centre):  # type: ignore
     return 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _polish(geometry, motor, q, pose):  # type: ignore[no-untyped-def]
-    """Newton's method on ``pose`` (3,) in place, until the step is lost in rounding."""
-    before = math.inf
-    for _ in range(60):
-        x = Interval(pose[0], pose[0])
-        y = Interval(pose[1], pose[1])
-        z = Interval(pose[2], pose[2])
-        inverse = _inverse_of_middle(_slopes(geometry, motor, q, x, y, z))
-        values = _residuals(geometry, motor, q, x, y, z)
-        size = 0.0
-        for k in range(3):
-            step = 0.0
-            for j in range(3):
-                step += inverse[k][j] * _middle(values[j])
-            pose[k] -= step
-            size += abs(step)
-        if not math.isfinite(size) or size == 0.0 or (size < 1e-13 and size >= before):
-            return
-        before = size
+@kernel
+def _polish(geometry, motor, q, chart, points):  # type: ignore[no-untyped-def]
+    """Newton's method on each of ``points`` (K, 3) in place, until the step is lost in rounding."""
+    point = np.empty((3, 2))
+    for n in range(points.shape[0]):
+        before = math.inf
+        for _ in range(60):
+            for k in range(3):
+                point[k, 0] = points[n, k]
+                point[k, 1] = points[n, k]
+            values, rows, _ = _enclosures(geometry, motor, q, chart, point)
+            inverse = _inverse_of_middle(rows)
+            size = 0.0
+            for k in range(3):
+                step = 0.0
+                for j in range(3):
+                    step += inverse[k][j] * _middle(values[j])
+                points[n, k] -= step
+                size += abs(step)
+            if not math.isfinite(size) or size == 0.0 or (size < 1e-13 and size >= before):
+                break
+            before = size
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _away_from_zero(geometry, motor, q, box):  # type: ignore[no-untyped-def]
-    values = _residuals(
-        geometry,
-        motor,
-        q,
-        Interval(box[0, 0], box[0, 1]),
-        Interval(box[1, 0], box[1, 1]),
-        Interval(box[2, 0], box[2, 1]),
-    )
-    away = False
-    for value in values:
-        away = away or value.lo > 0.0 or value.hi < 0.0
-    return away
+@inner
+def _total_share(box, limits):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for k in range(3):
+        total += (box[k, 1] - box[k, 0]) / (limits[k, 1] - limits[k, 0])
+    return total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _widest(box):  # type: ignore[no-untyped-def]
-    widest = 0
-    for k in range(1, 3):
-        if box[k, 1] - box[k, 0] > box[widest, 1] - box[widest, 0]:
-            widest = k
-    return widest
+@inner
+def _widest(box, limits):  # type: ignore[no-untyped-def]
+    """The coordinate in which ``box`` takes the greatest share of ``limits``, and that share."""
+    widest, greatest = 0, 0.0
+    for k in range(3):
+        share = (box[k, 1] - box[k, 0]) / (limits[k, 1] - limits[k, 0])
+        if share > greatest:
+            widest, greatest = k, share
+    return widest, greatest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _branch_and_prune(geometry, motor, q, limits, smallest, found, count, used):  # type: ignore[no-untyped-def]
-    """Polished candidates in the box ``limits`` (3, 2), appended to ``found`` (M, 3).
+@inner
+def _copy(source, target):  # type: ignore[no-untyped-def]
+    for k in range(3):
+        target[k, 0] = source[k, 0]
+        target[k, 1] = source[k, 1]
 
-    Returns their number, and the number of boxes looked at so far; stops where either runs out.
+
+@kernel
+def _branch_and_prune(geometry, motor, q, chart, limits, stack, found, used):  # type: ignore[no-untyped-def]
+    """Centres of boxes in ``limits`` (3, 2) that hold one zero or may hold a singular one, into ``found``.
+
+    Returns their number and the number of boxes looked at so far, ``used``; stops where either runs out.
     """
-    stack = np.empty((256, 3, 2))
-    stack[0] = limits
+    box, wide, centre = np.empty((3, 2)), np.empty((3, 2)), np.empty((3, 2))
+    _copy(limits, stack[0])
     depth = 1
-    box = np.empty((3, 2))
-    wide = np.empty((3, 2))
-    centre = np.empty(3)
+    count = 0
     while depth > 0 and used < BOX_LIMIT and count < found.shape[0]:
         depth -= 1
-        box[:] = stack[depth]
+        _copy(stack[depth], box)
         used += 1
-        state = -1 if _away_from_zero(geometry, motor, q, box) else 0
+        state = 0
         narrowing = True
         while state == 0 and narrowing:
-            before = (box[0, 1] - box[0, 0]) + (box[1, 1] - box[1, 0]) + (box[2, 1] - box[2, 0])
-            state = _newton_step(geometry, motor, q, box, limits, wide, centre)
-            after = (box[0, 1] - box[0, 0]) + (box[1, 1] - box[1, 0]) + (box[2, 1] - box[2, 0])
-            narrowing = after < 0.6 * before and after > smallest
-        k = _widest(box)
-        if state == 1 or (state == 0 and box[k, 1] - box[k, 0] <= smallest):
+            before = _total_share(box, limits)
+            state = _newton_step(geometry, motor, q, chart, box, limits, wide, centre)
+            after = _total_share(box, limits)
+            narrowing = CELL < after < 0.6 * before
+        k, share = _widest(box, limits)
+        if state == 1 or (state == 0 and share <= CELL):
             for j in range(3):
                 found[count, j] = 0.5 * (wide[j, 0] + wide[j, 1])
-            _polish(geometry, motor, q, found[count])
             count += 1
         elif state == 0:
             middle = 0.5 * (box[k, 0] + box[k, 1])
-            stack[depth] = box
+            _copy(box, stack[depth])
             stack[depth, k, 0] = middle
-            stack[depth + 1] = box
+            _copy(box, stack[depth + 1])
             stack[depth + 1, k, 1] = middle
             depth += 2
     return count, used
 
 
-def closures(
-    geometry: Any, motor: float, q: tuple[float, float, float], boxes: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Poses (K, 3) in ``boxes`` (B, 3, 2) of metres where the limbs close, polished, in the order found.
+def candidates(
+    geometry: Any,
+    motor: float,
+    q: tuple[float, float, float],
+    charts: Sequence[tuple[Chart, NDArray[np.float64]]],
+) -> list[tuple[Chart, NDArray[np.float64]]]:
+    """Where ``equations.closure`` vanishes in the ``charts``, each with the limits (3, 2) of its coordinates:
+    the same charts with the coordinates (K, 3) found, polished.
 
-    Those at which the equations vanish without an assembly are among them. Raises ParameterError where
-    assemblies do not stand apart: a curve of them, or a cluster at a singularity.
+    Raises ParameterError where assemblies do not stand apart: a curve of them, or a cluster at a singularity.
     """
-    widest = float(np.max(boxes[:, :, 1] - boxes[:, :, 0]))
-    found = np.empty((CELL_LIMIT, 3))
-    count, used = 0, 0
-    for limits in boxes:
-        count, used = _branch_and_prune(geometry, motor, q, limits, CELL * widest, found, count, used)
-        if used >= BOX_LIMIT or count >= CELL_LIMIT:
-            raise ParameterError(
-                f"The assemblies for q = {tuple(round(value, 6) for value in q)} do not stand apart.",
-                remedy="A singularity or a continuum of poses is there: give actuator coordinates beside it.",
-            )
-    return _distinct(found[:count], APART * widest)
+    stack = np.empty((STACK, 3, 2))
+    found = np.empty((CANDIDATE_LIMIT, 3))
+    used = 0
+    result = []
+    for chart, limits in charts:
+        count, used = _branch_and_prune(geometry, motor, q, chart, limits, stack, found, used)
+        if used >= BOX_LIMIT or count >= CANDIDATE_LIMIT:
+            raise _not_apart(q)
+        coordinates = found[:count].copy()
+        _polish(geometry, motor, q, chart, coordinates)
+        result.append((chart, coordinates))
+    return result
 
 
-def _distinct(poses: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
+def assemblies(
+    mechanism: Mechanism, poses: FloatArray, modes: Iterable[Any], q: FloatArray, motor: float, turn: float
+) -> FloatArray:
+    """The poses (K, 3), each once, that have the actuator coordinates ``q`` (3,) in one of the ``modes``
+    (their signs) by the inverse map, within the limits of legs and joints. ``turn``: differences of q by
+    multiples of it count as none; 0 if there is no such period.
+
+    Raises ParameterError where two are nearer than can be told apart.
+    """
+    radius = mechanism.reach_radius()
+    poses = _distinct(poses, SAME * radius)
+    x, y, z = pointwise.columns(poses)
+    valid = np.zeros(x.size, dtype=np.bool_)
+    found, legs, side = np.empty((x.size, 3)), np.empty(x.size), np.empty(x.size)
+    for signs in modes:
+        pointwise.actuators_row(mechanism.geometry, signs, motor, x, y, z, found)
+        pointwise.reach_row(mechanism.geometry, signs, x, y, z, legs, side)
+        difference = found - q
+        if turn > 0.0:
+            difference -= turn * np.round(difference / turn)
+        agrees = (np.abs(difference) <= AGREEMENT * np.maximum(1.0, np.abs(q))).all(axis=1)
+        valid |= agrees & (legs >= -SAME * radius) & (side >= -SAME * radius)
+    if len(_distinct(poses[valid], APART * radius)) < valid.sum():
+        raise _not_apart(q)
+    return poses[valid]
+
+
+def _distinct(poses: FloatArray, apart: float) -> FloatArray:
     """The finite poses, one of each cluster closer than ``apart``."""
-    kept: list[NDArray[np.float64]] = []
+    kept: list[FloatArray] = []
     for pose in poses[np.isfinite(poses).all(axis=1)]:
         if all(np.max(np.abs(pose - other)) > apart for other in kept):
             kept.append(pose)
     return np.array(kept).reshape(-1, 3)
+
+
+def _not_apart(q: Sequence[float] | FloatArray) -> ParameterError:
+    shown = ", ".join(f"{value:g}" for value in q)
+    return ParameterError(
+        f"The assemblies for q = ({shown}) do not stand apart.",
+        remedy="A singularity or a continuum of poses is there: give actuator coordinates beside it.",
+    )

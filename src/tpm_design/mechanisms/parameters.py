@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from tpm_design.errors import ParameterError, did_you_mean
 from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter
 
@@ -37,7 +40,7 @@ def _values(
                 remedy=f"Give {parameter.name!r} for all limbs, or {', '.join(single)} one each.",
             )
         value = given[parameter.name]
-        values = (value,) * count if isinstance(value, int | float) else tuple(value)
+        values: tuple[object, ...] = (value,) * count if isinstance(value, int | float) else tuple(value)
         if len(values) != count:
             raise ParameterError(
                 f"{kind.name}: {parameter.name!r} has {len(values)} values for {count} limbs."
@@ -76,9 +79,7 @@ def mode_signs(kind: MechanismKind, signs: Mapping[str, str]) -> dict[str, tuple
     known = [field.name for field in kind.mode_fields]
     for name in signs:
         if name not in known:
-            raise ParameterError(
-                f"{kind.name} has no mode field {name!r}.", remedy=did_you_mean(name, known)
-            )
+            raise ParameterError(f"{kind.name} has no mode field {name!r}.", remedy=did_you_mean(name, known))
     return {field.name: _field_signs(kind, field, signs) for field in kind.mode_fields}
 
 
@@ -90,6 +91,19 @@ def _field_signs(kind: MechanismKind, field: ModeField, signs: Mapping[str, str]
         choice = ' or "any"' if field.any_allowed else ""
         raise ParameterError(
             f"{kind.name}: {field.name} is {text!r}.",
-            remedy=f"Give {field.length} signs, such as \"{'+' * field.length}\"{choice}: {field.description}.",
+            remedy=f'Give {field.length} signs, such as "{"+" * field.length}"{choice}: {field.description}.',
         )
     return tuple(1.0 if sign == "+" else -1.0 for sign in text)
+
+
+def three_numbers(values: ArrayLike, name: str, remedy: str) -> NDArray[np.float64]:
+    """``values`` as a float array (3,); raises ParameterError on anything but three finite numbers."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} must be numbers.", remedy=remedy) from None
+    if array.shape != (3,):
+        raise ParameterError(f"{name} has shape {array.shape}.", remedy=remedy)
+    if not np.isfinite(array).all():
+        raise ParameterError(f"{name} is not finite.", remedy=remedy)
+    return array

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from tpm_design.arithmetic import FAST_MATH
+from tpm_design.arithmetic import FAST_MATH, inner, kernel
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.velocity import jacobian
 
@@ -39,7 +39,7 @@ def singularity_row(geometry, mode, x, y, z, determinants):  # type: ignore[no-u
             determinants[k, n] = values[k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def least_margin(margins):  # type: ignore[no-untyped-def]
     """Least of a tuple of margins; NaN counts as −inf, so that an undefined pose is outside."""
     least = math.inf
@@ -48,14 +48,14 @@ def least_margin(margins):  # type: ignore[no-untyped-def]
     return least
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def serial_row(geometry, mode, x, y, z, out):  # type: ignore[no-untyped-def]
     """Least serial margin (N,), written in place."""
     for n in range(x.size):
         out[n] = least_margin(equations.serial_margins(geometry, mode, x[n], y[n], z[n]))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def actuators_row(geometry, mode, motor, x, y, z, out):  # type: ignore[no-untyped-def]
     """Actuator coordinates (N, 3), written in place."""
     for n in range(x.size):
@@ -64,7 +64,7 @@ def actuators_row(geometry, mode, motor, x, y, z, out):  # type: ignore[no-untyp
             out[n, k] = values[k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def jacobian_row(geometry, mode, motor, x, y, z, out):  # type: ignore[no-untyped-def]
     """J (N, 3, 3), written in place."""
     for n in range(x.size):
@@ -75,7 +75,7 @@ def jacobian_row(geometry, mode, motor, x, y, z, out):  # type: ignore[no-untype
                 out[n, i, j] = values[i][j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def centres_at(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """Joint centres at one pose, nested tuples as the mechanism gives them."""
     return equations.joint_centres(geometry, mode, x, y, z)

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from tpm_design.arithmetic import inner
 
 Point = tuple[float, float, float]
 
 
-@njit(error_model="numpy")
+@inner
 def _dot(u, v):  # type: ignore[no-untyped-def]
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-@njit(error_model="numpy")
+@inner
 def _clamp(value):  # type: ignore[no-untyped-def]
     return min(1.0, max(0.0, value))
 
 
-@njit(error_model="numpy")
+@inner
 def segment_distance(a, b, c, d):  # type: ignore[no-untyped-def]
     """Distance (m) between segments ab and cd.
 
@@ -45,7 +45,7 @@ def segment_distance(a, b, c, d):  # type: ignore[no-untyped-def]
     return math.sqrt(max(0.0, least))
 
 
-@njit(error_model="numpy")
+@inner
 def _square(w, u, v, s, t):  # type: ignore[no-untyped-def]
     x = w[0] + s * u[0] - t * v[0]
     y = w[1] + s * u[1] - t * v[1]
@@ -53,7 +53,7 @@ def _square(w, u, v, s, t):  # type: ignore[no-untyped-def]
     return x * x + y * y + z * z
 
 
-@njit(error_model="numpy")
+@inner
 def chain_distance(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
     """Distance (m) between the two-link chains a0–a1–a2 and b0–b1–b2."""
     return min(

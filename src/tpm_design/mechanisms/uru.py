@@ -5,8 +5,11 @@ Singularity Analysis", Robotics 9(3), 60, 2020. Equation numbers in brackets are
 is used with its indices corrected.
 """
 
+# mypy: disallow-untyped-calls=False
+
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +17,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
 from tpm_design.arithmetic import (
@@ -29,14 +33,16 @@ from tpm_design.arithmetic import (
     sqr,
 )
 from tpm_design.arithmetic.algebra import determinant
-from tpm_design.mechanisms import equations
+from tpm_design.arithmetic.compilation import STRICT
+from tpm_design.mechanisms import equations, forward
 from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.mechanism import FloatArray, Mechanism, Mode
-from tpm_design.mechanisms.parameters import limb_values, mode_signs
+from tpm_design.mechanisms.parameters import limb_values, mode_signs, three_numbers
 from tpm_design.mechanisms.segments import chain_distance
+from tpm_design.mechanisms.symmetry import IDENTITY, SignedPermutation, mode_orbits, symmetries
 
-Triple = tuple[float, float, float]
-Quadruple = tuple[float, float, float, float]
+Triple = tuple[float, ...]
+Quadruple = tuple[float, ...]
 
 
 class UruGeometry(NamedTuple):
@@ -182,7 +188,7 @@ def limb_rows(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
 def _limb_rows(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
     """v_i and w_i/|w_i|. With w_i = v_i + (k_i γ_i/β_i) g_i and g_i ⟂ v_i the unit row is
     cos ψ v_i + sin ψ g_i, tan ψ = k_i γ_i/β_i: no pole on the axis e_i."""
-    a, c, gamma, beta, rho_squared, alpha = limb_chain(geometry, limb, elbow, p, pj, pk)
+    a, c, gamma, beta, _, _ = limb_chain(geometry, limb, elbow, p, pj, pk)
     hj = direction_cosine(pj, pk)
     hk = direction_cosine(pk, pj)
     lever = geometry.gear[limb] * gamma
@@ -225,7 +231,7 @@ def limb_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-u
 @formula(limb_velocity, UruGeometry)
 def _limb_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-untyped-def]
     """Joints: v_i and γ_i (18). Motors: w_i = v_i + (k_i γ_i/β_i) g_i and k_i γ_i (19)."""
-    a, c, gamma, beta, rho_squared, alpha = limb_chain(geometry, limb, elbow, p, pj, pk)
+    a, c, gamma, beta, _, _ = limb_chain(geometry, limb, elbow, p, pj, pk)
     hj = direction_cosine(pj, pk)
     hk = direction_cosine(pk, pj)
     gear = geometry.gear[limb]
@@ -293,30 +299,52 @@ def _actuators(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
     return limb1[1] / k1 + limb1[0], limb2[1] / k2 + limb2[0], limb3[1] / k3 + limb3[0]
 
 
-def limb_closure(geometry, limb, motor, q, first, p, pj, pk):  # type: ignore[no-untyped-def]
-    """Residual of the loop closure of one limb, see the implementation."""
+def limb_closure(geometry, limb, motor, q, size, first, d, dj, dk):  # type: ignore[no-untyped-def]
+    """Loop closure of one limb, see the implementation."""
     raise NotImplementedError
 
 
 @formula(limb_closure, UruGeometry)
-def _limb_closure(geometry, limb, motor, q, first, p, pj, pk):  # type: ignore[no-untyped-def]
-    """(α_i − f_i cos θ_i2)² + (β_i − f_i sin θ_i2)² − r_i², with θ_i2 the actuator itself or, driven by
-    the motors, k_i (θ_iM − θ_i1) (11)."""
+def _limb_closure(geometry, limb, motor, q, size, first, d, dj, dk):  # type: ignore[no-untyped-def]
+    """(α_i − f_i cos θ_i2)² + (β_i − f_i sin θ_i2)² − r_i² at the pose size · (d, dj, dk), with θ_i2 the
+    actuator itself or, driven by the motors, k_i (θ_iM − θ_i1) (11); and how far that θ_i2 is outside
+    (−π, 2π), where no pose has it."""
     f = geometry.proximal[limb]
-    alpha = p + (geometry.platform[limb] - geometry.base[limb])
-    beta = root(sqr(pj) + sqr(pk))
+    r = geometry.distal[limb]
+    offset = geometry.platform[limb] - geometry.base[limb]
+    across = root(sqr(dj) + sqr(dk))
     second = (motor * geometry.gear[limb]) * (q - first) + (1.0 - motor) * q
-    return sqr(alpha - f * cosine(second)) + sqr(beta - f * sine(second)) - sqr(geometry.distal[limb])
+    excess = magnitude(second - 0.5 * math.pi) - 1.5 * math.pi
+    if offset == 0.0 and f == r:
+        # closed at the origin for every θ_i2: that factor is divided out
+        plain = size * (sqr(d) + sqr(across)) - 2.0 * f * (d * cosine(second) + across * sine(second))
+        return plain, excess
+    along = size * d + offset - f * cosine(second)
+    return sqr(along) + sqr(size * across - f * sine(second)) - sqr(r), excess
+
+
+@register_jitable(**STRICT)
+def chart_direction(chart, v, w):  # type: ignore[no-untyped-def]
+    """Point of the cube's face ``chart``: which coordinate is the largest, 0, 1 or 2, and its sign. The
+    others are v, w of either sign."""
+    axis, side = chart
+    one = 0.0 * v + side
+    if axis == 0.0:
+        return one, v, w
+    if axis == 1.0:
+        return w, one, v
+    return v, w, one
 
 
 @formula(equations.closure, UruGeometry)
-def _closure(geometry, motor, q, x, y, z):  # type: ignore[no-untyped-def]
-    """For poses inside one octant, where θ_i1 keeps to one quadrant."""
-    return (
-        limb_closure(geometry, 0, motor, q[0], arctangent2(y, -z), x, y, z),
-        limb_closure(geometry, 1, motor, q[1], arctangent2(-x, -z), y, z, x),
-        limb_closure(geometry, 2, motor, q[2], arctangent2(x, -y), z, x, y),
-    )
+def _closure(geometry, motor, q, chart, u, v, w):  # type: ignore[no-untyped-def]
+    """The pose is u times a point of the unit cube's surface: θ_i1 depends on that point alone, so that the
+    bounds do not degrade towards the origin. v and w keep their signs: θ_i1 then stays in its quadrant."""
+    dx, dy, dz = chart_direction(chart, v, w)
+    first, excess1 = limb_closure(geometry, 0, motor, q[0], u, arctangent2(dy, -dz), dx, dy, dz)
+    second, excess2 = limb_closure(geometry, 1, motor, q[1], u, arctangent2(-dx, -dz), dy, dz, dx)
+    third, excess3 = limb_closure(geometry, 2, motor, q[2], u, arctangent2(dx, -dy), dz, dx, dy)
+    return (first, second, third), (excess1, excess2, excess3)
 
 
 @formula(equations.joint_centres, UruGeometry)
@@ -345,7 +373,7 @@ def limb_error_gain(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untype
 def _limb_error_gain(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
     """Loop closure with locked actuators: w_i·dx = −(v_i·e_i)(dd_p − dd_b) + (v_i·u_i) df + dr, where
     v_i·u_i = cos θ_i3."""
-    a, c, gamma, beta, rho_squared, alpha = limb_chain(geometry, limb, elbow, p, pj, pk)
+    a, _, _, _, rho_squared, _ = limb_chain(geometry, limb, elbow, p, pj, pk)
     f = geometry.proximal[limb]
     r = geometry.distal[limb]
     bend = (rho_squared - sqr(f) - sqr(r)) / (2.0 * f * r)
@@ -376,7 +404,36 @@ def _limb_clearance(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     first = chain_distance(a1, c1, b1, a2, c2, b2)
     second = chain_distance(a2, c2, b2, a3, c3, b3)
     third = chain_distance(a3, c3, b3, a1, c1, b1)
-    return min(first, min(second, third)) - 2.0 * geometry.link_radius
+    return min(first, second, third) - 2.0 * geometry.link_radius
+
+
+ELBOWS: tuple[Triple, ...] = tuple(itertools.product((1.0, -1.0), (1.0, -1.0), (1.0, -1.0)))
+
+# charts overlap, so that an assembly with two equal coordinates lies inside one
+FACE = 1.05
+NEAREST = 1e-12
+
+
+def cube_charts(radius: float) -> list[tuple[tuple[float, float], FloatArray]]:
+    """The charts of ``chart_direction`` with the limits (3, 2) of their coordinates, that together hold every
+    pose within ``radius`` off the coordinate planes."""
+    ranges = ((NEAREST, FACE), (-FACE, -NEAREST))
+    return [
+        ((axis, side), np.array([(NEAREST * radius, radius), v, w]))
+        for axis, side, v, w in itertools.product((0.0, 1.0, 2.0), (1.0, -1.0), ranges, ranges)
+    ]
+
+
+def chart_poses(chart: tuple[float, ...], coordinates: FloatArray) -> FloatArray:
+    """Poses (K, 3) of coordinates (K, 3) in a chart."""
+    size, v, w = coordinates.T
+    return np.column_stack([size * d for d in chart_direction(chart, v, w)])
+
+
+def shaft_possible(angle: float, gear: float) -> bool:
+    """Whether θ_iM = θ_i2/k_i + θ_i1 can be with θ_i2 in (−π, 2π) and θ_i1 in (−π, π]."""
+    ends = (-math.pi / gear, 2.0 * math.pi / gear)
+    return min(ends) - math.pi <= angle <= max(ends) + math.pi
 
 
 @dataclass(frozen=True)
@@ -405,9 +462,31 @@ class Uru(Mechanism):
         return sum(self.geometry.proximal) + sum(self.geometry.distal)
 
     def fk(self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor") -> FloatArray:
-        """Every real assembly (K, 3)."""
-        self.motor_weight(drive)
-        return np.empty((0, 3))
+        """Every real assembly (K, 3) in metres for the actuator coordinates ``q`` (3,) in rad, of all working
+        modes or of ``mode`` alone; (0, 3) if there is none. A complete search: none is missed but those
+        within 1e-12 of a coordinate plane, as a share of the reach.
+
+        Motors: the shaft angles that ``ik`` gives, which count turns. Joints: modulo 2π, the same machine.
+        Raises ParameterError on an unknown ``drive``, on anything but three finite numbers, and where
+        assemblies do not stand apart, at a singularity.
+        """
+        motor = self.motor_weight(drive)
+        angles = three_numbers(q, "q", "Give three actuator coordinates in rad.")
+        if motor == 0.0:
+            angles = np.remainder(angles + math.pi, 2.0 * math.pi) - math.pi
+        elif not all(map(shaft_possible, angles, self.geometry.gear)):
+            return np.empty((0, 3))
+        radius = self.reach_radius()
+        coordinates = (float(angles[0]), float(angles[1]), float(angles[2]))
+        found = forward.candidates(self.geometry, motor, coordinates, cube_charts(radius))
+        poses = np.concatenate([chart_poses(chart, values) for chart, values in found])
+        octant = (0.0, 0.0, 0.0) if mode is None else mode.signs.octant
+        off_planes = (np.abs(poses) > NEAREST * radius).all(axis=1)
+        inside = (poses * np.asarray(octant) >= 0.0).all(axis=1)
+        elbows = ELBOWS if mode is None else (mode.signs.elbows,)
+        modes = [UruSigns(octant=octant, elbows=signs) for signs in elbows]
+        turn = 0.0 if motor else 2.0 * math.pi
+        return forward.assemblies(self, poses[off_planes & inside], modes, angles, motor, turn)
 
 
 def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str, Any]) -> Uru:
@@ -426,9 +505,7 @@ def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str
         limited=0.0 if all(r is None for r in ranges) else 1.0,
         limit_cosine=tuple(math.cos(m) for m in middles),
         limit_sine=tuple(math.sin(m) for m in middles),
-        limit_bound=tuple(
-            -2.0 if r is None else math.cos(h) for r, h in zip(ranges, halves, strict=True)
-        ),
+        limit_bound=tuple(-2.0 if r is None else math.cos(h) for r, h in zip(ranges, halves, strict=True)),
         link_radius=float(limits.get("link_radius", 0.0)),
     )
     return Uru(kind=KIND, parameters=values, geometry=geometry)
@@ -446,6 +523,29 @@ def farthest_reach(ranges: Mapping[str, tuple[float, float]]) -> float:
     return span("f")[1] + span("r")[1] + offset
 
 
+def mode_candidates(
+    ranges: Mapping[str, tuple[float, float]], center_free: bool
+) -> tuple[dict[str, str], ...]:
+    """Sign strings of one mode per orbit of the symmetries that every design of the ranges has.
+
+    All 64 unless ``center_free``: a region that stays in its place tells equal modes apart. A caller whose
+    region, home pose or joint limits are not the same along the three axes should ask for all as well.
+    """
+    shared = {IDENTITY}
+    if center_free:
+        random = np.random.default_rng(0)
+        shared = set.intersection(*(set(_random_symmetries(ranges, random)) for _ in range(3)))
+    return tuple(orbit[0] for orbit in mode_orbits(shared))
+
+
+def _random_symmetries(
+    ranges: Mapping[str, tuple[float, float]], random: np.random.Generator
+) -> tuple[SignedPermutation, ...]:
+    """Symmetries of a machine with random dimensions in the ranges: symmetry by chance has measure 0."""
+    values = {name: float(random.uniform(low, high)) for name, (low, high) in ranges.items()}
+    return symmetries(build(values, {}).geometry)
+
+
 KIND = MechanismKind(
     name="uru",
     title="LaMaViP 3-URU",
@@ -455,7 +555,9 @@ KIND = MechanismKind(
     ),
     parameters=(
         Parameter("db", "d_b", "length", "non-negative", "distance of the base joints A_i from the origin O"),
-        Parameter("dp", "d_p", "length", "non-negative", "distance of the platform joints B_i from its point P"),
+        Parameter(
+            "dp", "d_p", "length", "non-negative", "distance of the platform joints B_i from its point P"
+        ),
         Parameter("f", "f_i", "length", "positive", "proximal link A_iC_i"),
         Parameter("r", "r_i", "length", "positive", "distal link C_iB_i"),
         Parameter("k", "k_i", "ratio", "non-zero", "gear ratio of the bevel gearbox, either sign"),
@@ -484,4 +586,5 @@ KIND = MechanismKind(
     example=MappingProxyType({"db": 0.1, "dp": 0.06, "f": 0.25, "r": 0.25, "k": 1.0}),
     build=build,
     farthest_reach=farthest_reach,
+    mode_candidates=mode_candidates,
 )

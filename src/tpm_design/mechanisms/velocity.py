@@ -8,20 +8,20 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from tpm_design.arithmetic import inner
 
 
-@njit(error_model="numpy")
+@inner
 def _cross(u, v):  # type: ignore[no-untyped-def]
     return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
 
 
-@njit(error_model="numpy")
+@inner
 def _square(u):  # type: ignore[no-untyped-def]
     return u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
 
 
-@njit(error_model="numpy")
+@inner
 def adjugate_columns(rows):  # type: ignore[no-untyped-def]
     """Columns of adj(A) for A given by rows, and det A."""
     first = _cross(rows[1], rows[2])
@@ -31,7 +31,7 @@ def adjugate_columns(rows):  # type: ignore[no-untyped-def]
     return (first, second, third), determinant
 
 
-@njit(error_model="numpy")
+@inner
 def scaled_singular_values(columns):  # type: ignore[no-untyped-def]
     """(greatest, least) singular value of the matrix with these columns.
 
@@ -62,7 +62,7 @@ def scaled_singular_values(columns):  # type: ignore[no-untyped-def]
     return math.sqrt(greatest), abs(determinant) / math.sqrt(greatest * middle)
 
 
-@njit(error_model="numpy")
+@inner
 def _scaled_columns(columns, b):  # type: ignore[no-untyped-def]
     u, v, w = columns
     return (
@@ -72,7 +72,7 @@ def _scaled_columns(columns, b):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(error_model="numpy")
+@inner
 def inverse_condition_2(rows, b):  # type: ignore[no-untyped-def]
     """1/κ₂ = σ_min/σ_max of J, in [0, 1]."""
     columns, _ = adjugate_columns(rows)
@@ -80,7 +80,7 @@ def inverse_condition_2(rows, b):  # type: ignore[no-untyped-def]
     return least / greatest if greatest > 0.0 else 0.0
 
 
-@njit(error_model="numpy")
+@inner
 def inverse_condition_frobenius(rows, b):  # type: ignore[no-untyped-def]
     """1/κ_F = 3/(‖J‖_F ‖J⁻¹‖_F), in [0, 1] (Gosselin & Angeles 1991, weight 1/n)."""
     columns, determinant = adjugate_columns(rows)
@@ -94,7 +94,7 @@ def inverse_condition_frobenius(rows, b):  # type: ignore[no-untyped-def]
     return 3.0 * abs(determinant * b[0] * c1) / math.sqrt(product)
 
 
-@njit(error_model="numpy")
+@inner
 def singular_values(rows, b):  # type: ignore[no-untyped-def]
     """(greatest, least) singular value of J; the greatest is infinite where det A = 0."""
     columns, determinant = adjugate_columns(rows)
@@ -105,7 +105,7 @@ def singular_values(rows, b):  # type: ignore[no-untyped-def]
     return greatest / size, least / size
 
 
-@njit(error_model="numpy")
+@inner
 def jacobian(rows, b):  # type: ignore[no-untyped-def]
     """J = A⁻¹ diag(b) as three rows."""
     columns, determinant = adjugate_columns(rows)
@@ -117,7 +117,7 @@ def jacobian(rows, b):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(error_model="numpy")
+@inner
 def output_transmission(rows):  # type: ignore[no-untyped-def]
     """Least η_i = |det[a_1 a_2 a_3]| / |a_j × a_k| of unit rows; 0 where two rows are parallel."""
     columns, determinant = adjugate_columns(rows)

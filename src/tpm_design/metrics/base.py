@@ -38,7 +38,8 @@ class Measurement:
 
     Values may be flat where a constraint on them fails; then ``depth`` ≤ 0 is added to a negative slack,
     and ``full_slack`` replaces the slack of a constraint that asks for the full score 1 (coverage).
-    ``notes`` are extra columns, such as which locus was nearest.
+    ``pieces``: values whose least (of a metric to be large) or greatest is ``value``, or the pieces of
+    ``full_slack``: smoother in the design than their minimum. ``notes`` are extra columns, such as which locus was nearest.
     """
 
     value: float
@@ -46,6 +47,7 @@ class Measurement:
     depth: float = 0.0
     full_slack: float | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
+    pieces: tuple[float, ...] = ()
 
     @classmethod
     def undefined(cls, reason: str) -> Measurement:
@@ -55,7 +57,8 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Metric:
-    """One figure of merit. ``scale`` (in the metric's SI unit) makes its violation dimensionless."""
+    """One figure of merit. ``scale`` (in the metric's SI unit) makes its violation dimensionless. ``notes``:
+    names of the notes its measurements may carry."""
 
     name: str
     unit: str
@@ -67,6 +70,7 @@ class Metric:
     options: tuple[Option, ...] = ()
     needs_region: bool = True
     differentiable: bool = True
+    notes: tuple[str, ...] = ()
     applies: Callable[[MechanismKind], bool] = lambda kind: True
 
     def option(self, name: str) -> Option | None:

@@ -31,7 +31,7 @@ def _boundary_distance(context: Context, options: Mapping[str, Any]) -> Measurem
         return Measurement(context.reach.value, context.reach.error)
     # the leg margins are the distances to the shells, so their least value is the distance to the nearest
     legs = context.least(Index(LEGS))
-    return Measurement(legs.value, legs.error)
+    return Measurement(legs.value, legs.error, pieces=legs.pieces)
 
 
 def _singularity_margin_min(context: Context, options: Mapping[str, Any]) -> Measurement:
@@ -47,14 +47,14 @@ def _link_clearance(context: Context, options: Mapping[str, Any]) -> Measurement
     if not context.reachable:
         return Measurement.undefined("the region is not reachable")
     extreme = context.least(Index(CLEARANCE))
-    return Measurement(extreme.value, extreme.error)
+    return Measurement(extreme.value, extreme.error, pieces=extreme.pieces)
 
 
 def _distance(name: str, condition: str) -> Metric:
     return Metric(
         f"{name}_singularity_distance", "m", "maximize", 0.1,
         f"least Euclidean distance from the region to {condition}; minus the depth where it cuts in",
-        SEARCH, _locus_distance(name), differentiable=False,
+        SEARCH, _locus_distance(name), differentiable=False, notes=("locus",),
     )  # fmt: skip
 
 

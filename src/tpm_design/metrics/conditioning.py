@@ -52,14 +52,14 @@ def _minimum(context: Context, options: Mapping[str, Any]) -> Measurement:
     if options["over"] == "aspect":
         fine, coarse = _averages(context, options, 0.5)
         return Measurement(fine.least, abs(fine.least - coarse.least))
-    extreme = context.least(_index(context, options))
     if not context.reachable:
         # unreachable poses count as singular; the reach shortfall guides a search back
-        shortfall = context.reach.value / context.mechanism.reach_radius()
-        return Measurement(0.0, 0.0, depth=shortfall)
-    if min(side.margin for side in context.sides) < 0.0 and extreme.value > 0.0:
-        return Measurement(extreme.value, extreme.value)
-    return Measurement(extreme.value, extreme.error)
+        return Measurement(0.0, depth=context.reach.value / context.mechanism.reach_radius())
+    worst = context.side_driven_by(options["drive"]).margin
+    if worst <= 0.0:
+        return Measurement(0.0, depth=worst)
+    extreme = context.least(_index(context, options))
+    return Measurement(extreme.value, extreme.error, pieces=extreme.pieces)
 
 
 def _at_points(context: Context, options: Mapping[str, Any]) -> np.ndarray:

@@ -24,11 +24,11 @@ SURVEY_RAYS_PER_SAMPLE = 2
 @dataclass(frozen=True)
 class Sides:
     """For one determinant over the region: ``margin`` its least value on the side it mostly keeps
-    (negative where it changes sign), with ``error``; ``code`` +1 or −1 for that side."""
+    (negative where it changes sign), with ``error`` and the ``pieces`` of it."""
 
     margin: float
     error: float
-    code: int
+    pieces: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -95,11 +95,16 @@ class Context:
         """Every determinant over the region, in the order of the mechanism."""
         return tuple(self._side(part) for part in range(len(self.mechanism.kind.determinants)))
 
+    def side_driven_by(self, drive: str) -> Sides:
+        """The determinant whose zero takes control from these actuators: W for motors, V for joints."""
+        name = "actuation" if drive == "motor" else "translation"
+        return self.sides[self.mechanism.kind.determinants.index(name)]
+
     def _side(self, part: int) -> Sides:
         values = self.lattice_determinants[part]
         sign = 1.0 if values.min() + values.max() >= 0.0 else -1.0
         extreme = self.least(Index(DETERMINANT, part=part, sign=sign))
-        return Sides(sign * extreme.value, extreme.error, int(sign))
+        return Sides(sign * extreme.value, extreme.error, tuple(sign * piece for piece in extreme.pieces))
 
     @cached_property
     def _survey(self) -> RayField:
@@ -138,7 +143,7 @@ class Context:
         for axis in range(3):
             low = self.least(Index(EXTENT, part=axis, sign=1.0))
             high = self.least(Index(EXTENT, part=axis, sign=-1.0))
-            sides.append(Extreme(high.value - low.value, high.error + low.error, high.pose))
+            sides.append(Extreme(high.value - low.value, high.error + low.error, high.pose, ()))
         return max(sides, key=lambda side: side.value)
 
     def mode_rays(self, margin: float, *, sided: bool) -> tuple[RayField, RayField]:

@@ -17,21 +17,15 @@ JOINT_DRIVE = Option(
 )
 
 
-def _singular(context: Context, drive: str) -> bool:
-    """Whether J ceases to exist somewhere in the region."""
-    locus = "actuation" if drive == "motor" else "translation"
-    return context.sides[context.mechanism.kind.determinants.index(locus)].margin <= 0.0
-
-
 def _extreme(quantity: int, sign: float) -> Callable[[Context, Mapping[str, Any]], Measurement]:
     def compute(context: Context, options: Mapping[str, Any]) -> Measurement:
         if not context.reachable:
             return Measurement.undefined("the region is not reachable")
-        if sign < 0.0 and _singular(context, options["drive"]):
+        if sign < 0.0 and context.side_driven_by(options["drive"]).margin <= 0.0:
             return Measurement.undefined("unbounded: a singularity cuts the region")
         motor = context.mechanism.motor_weight(options["drive"])
         found = context.least(Index(quantity, motor=motor, sign=sign))
-        return Measurement(found.value, found.error)
+        return Measurement(found.value, found.error, pieces=found.pieces)
 
     return compute
 

@@ -52,15 +52,17 @@ def _workspace_ratio(context: Context, options: Mapping[str, Any]) -> Measuremen
 
 def _coverage(context: Context, options: Mapping[str, Any]) -> Measurement:
     length = context.mechanism.reach_radius()
-    worst = min(context.reach.value / length, min(side.margin for side in context.sides))
+    reach = tuple(piece / length for piece in context.reach.pieces)
+    pieces = (*reach, *(piece for side in context.sides for piece in side.pieces))
+    worst = min(pieces)
     if worst >= 0.0:
-        return Measurement(1.0, 0.0, full_slack=worst)
+        return Measurement(1.0, 0.0, full_slack=worst, pieces=pieces)
     fine, coarse = (
         _point_shares(context) if context.placed.form == POINTS else _solid_shares(context)
     )
     # what the samples' polish found outside is smaller than the rays resolve
     share = min(fine, 1.0 - RESOLUTION)
-    return Measurement(share, max(abs(fine - coarse), RESOLUTION), full_slack=worst)
+    return Measurement(share, max(abs(fine - coarse), RESOLUTION), full_slack=worst, pieces=pieces)
 
 
 RESOLUTION = 1e-6

@@ -13,8 +13,9 @@ from tpm_design.optimizers.watch import LOCAL_STEP, LOCAL_TOLERANCE, RESTART_DIS
 AGS_CONSTRAINTS = 10
 """AGS keeps room for ten constraints and for ten variables."""
 
-STOPS_SHORT = ("LD_MMA", "LD_CCSAQ")
-"""MMA and CCSA may take the first bounds they touch for convergence."""
+STOPS_SHORT = ("LD_MMA", "LD_CCSAQ", "LN_COBYLA")
+"""MMA and CCSA may take the first bounds they touch for convergence; COBYLA halts at the kinks of metrics
+that are the least of several. Begun again from there they go on."""
 
 Method = Callable[[Watch, int], str]
 

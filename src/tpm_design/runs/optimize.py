@@ -79,7 +79,7 @@ def search(
     space = DesignSpace(problem.variables, problem.fixed, octant_signs(problem.modes))
     log = EvaluationLog(problem, workers=workers, record=record)
     kept = int(POLISH_SHARE * plan.budget) if plan.polish is not None else 0
-    whole = UnitSearch(log, space, space.start(), max(1, plan.budget - kept))
+    whole = UnitSearch(log, space, space.start(), max(1, plan.budget - kept), (1,) * len(problem.constraints))
     remarks = _remarks(method, problem)
     try:
         ending, detail = _run(method, whole, plan.seed)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tpm_design.design_space import DesignSpace
 from tpm_design.optimizers.base import BudgetSpent, Outcomes
-from tpm_design.problem import Design, Evaluation, Problem, evaluate
+from tpm_design.problem import Design, Evaluation, Goal, Problem, evaluate
 
 FloatArray = NDArray[np.float64]
 Key = tuple[float | str, ...]
@@ -92,12 +92,14 @@ class EvaluationLog:
 
 @dataclass(frozen=True)
 class UnitSearch:
-    """A ``Search`` over a design space, up to ``limit`` entries in the log."""
+    """A ``Search`` over a design space, up to ``limit`` entries in the log. ``sizes``: in how many smooth
+    pieces each constraint is given to the optimiser."""
 
     log: EvaluationLog
     space: DesignSpace
     start: FloatArray
     limit: int
+    sizes: tuple[int, ...]
 
     @property
     def dimension(self) -> int:
@@ -109,18 +111,20 @@ class UnitSearch:
 
     @property
     def constraint_count(self) -> int:
-        return len(self.log.problem.constraints)
+        return sum(self.sizes)
 
     def evaluate(self, points: FloatArray) -> Outcomes:
         """Values at ``points`` (N, n). Raises BudgetSpent."""
         table = np.atleast_2d(np.asarray(points, dtype=np.float64))
         results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
-        return outcomes(self.log.problem, results)
+        return outcomes(self.log.problem, results, self.sizes)
 
     def continuous_around(self, entry: Entry, limit: int) -> UnitSearch:
         """The search of the continuous variables alone, from a design already evaluated."""
-        space = self.space.holding_discrete(entry.evaluation.design)
-        return replace(self, space=space, start=space.point(entry.evaluation.design), limit=limit)
+        evaluation = entry.evaluation
+        space = self.space.holding_discrete(evaluation.design)
+        sizes = tuple(len(evaluation.pieces[goal.label]) for goal in self.log.problem.constraints)
+        return replace(self, space=space, start=space.point(evaluation.design), limit=limit, sizes=sizes)
 
 
 def design_key(design: Design) -> Key:
@@ -137,19 +141,26 @@ def minimised(problem: Problem, evaluation: Evaluation) -> float:
     return (value if goal.sense == "minimize" else -value) / goal.metric.scale
 
 
-def outcomes(problem: Problem, results: Sequence[Evaluation]) -> Outcomes:
-    """What an optimiser gets to see: finite everywhere."""
+def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[int]) -> Outcomes:
+    """What an optimiser gets to see, finite everywhere. ``sizes``: number of pieces of each constraint; a
+    constraint of fewer pieces repeats its least."""
     objective = np.array([minimised(problem, result) for result in results])
     constraints = np.array(
         [
             [
-                result.slacks.get(goal.label, -FAILED * goal.metric.scale) / goal.metric.scale
-                for goal in problem.constraints
+                piece / goal.metric.scale
+                for goal, size in zip(problem.constraints, sizes, strict=True)
+                for piece in _pieces(goal, result, size)
             ]
             for result in results
         ]
-    ).reshape(len(results), len(problem.constraints))
+    ).reshape(len(results), sum(sizes))
     violation = np.array(
         [result.violation if math.isfinite(result.violation) else FAILED for result in results]
     )
     return Outcomes(objective, constraints, objective + PENALTY * violation)
+
+
+def _pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:
+    pieces = result.pieces.get(goal.label, (-FAILED * goal.metric.scale,))
+    return pieces if len(pieces) == size else (min(pieces),) * size

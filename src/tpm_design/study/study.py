@@ -7,12 +7,15 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tpm_design.errors import UsageError
-from tpm_design.problem import Problem
+from tpm_design.problem import Evaluation, Problem
 from tpm_design.study.sweep import Sweep
 from tpm_design.units import Units
+
+if TYPE_CHECKING:
+    from tpm_design.study.actions import Run
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,32 @@ class Study:
         """SHA-256 of the resolved study: equal for studies that ask the same, however they are written."""
         canonical = json.dumps(self.resolved(), sort_keys=True, separators=(",", ":"), ensure_ascii=False)
         return hashlib.sha256(canonical.encode()).hexdigest()
+
+    def evaluate(self, values: Mapping[str, float | str]) -> Evaluation:
+        """Every metric of one design. ``values``: SI, by name; a free quantity that is not given takes its
+        initial value, else the middle of its range, else the first value listed. Raises UsageError."""
+        from tpm_design.study.actions import evaluate_design
+
+        return evaluate_design(self, values)
+
+    def optimize(
+        self,
+        *,
+        seed: int | None = None,
+        budget: int | None = None,
+        workers: int = 1,
+        output: str | Path | None = None,
+    ) -> Run:
+        """Search the design space; a run folder is written below ``output`` if that is given.
+
+        Raises RefusedError where the method cannot search this problem, UsageError on bad arguments.
+        """
+        from tpm_design.study.actions import optimize_study
+
+        if workers < 1:
+            raise UsageError(f"{workers} workers cannot work", remedy="Choose a whole number from 1.")
+        study = self.searched_with(seed=seed, budget=budget)
+        return optimize_study(study, workers=workers, output=None if output is None else Path(output))
 
     def searched_with(self, *, seed: int | None = None, budget: int | None = None) -> Study:
         """The same study with another seed or budget. Raises UsageError for values a study cannot have."""

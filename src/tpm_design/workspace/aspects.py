@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.directions import ALL_OCTANTS, Octant, RaySet, ray_set
-from tpm_design.workspace.poses import side_code, workspace_margin
+from tpm_design.workspace.poses import aspect_code
 from tpm_design.workspace.rays import Segments, trace
 from tpm_design.workspace.region_geometry import BOX, CYLINDER, PlacedRegion
 
@@ -36,7 +36,7 @@ class RayField:
         return int(np.argmax(self.volumes)) if self.volumes.size else None
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _find(parent, item):  # type: ignore[no-untyped-def]
     while parent[item] != item:
         parent[item] = parent[parent[item]]
@@ -44,7 +44,7 @@ def _find(parent, item):  # type: ignore[no-untyped-def]
     return item
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _components(first, start, end, code, neighbours):  # type: ignore[no-untyped-def]
     """Join segments of neighbouring rays that have one code and overlap; number the sets in order."""
     parent = np.arange(start.size)
@@ -130,9 +130,7 @@ def locate(mechanism: Mechanism, mode: Mode, field: RayField, pose: tuple[float,
     """Component of the field that holds a pose: the segment of its sides on the nearest ray that overlaps
     its radius, or None where the pose lies in no aspect."""
     x, y, z = pose
-    if workspace_margin(mechanism.geometry, mode.signs, x, y, z) < 0.0:
-        return None
-    code = side_code(mechanism.geometry, mode.signs, 0.0, x, y, z)
+    code = aspect_code(mechanism.geometry, mode.signs, x, y, z)
     candidates = np.flatnonzero(field.segments.code == code)
     if code == 0 or not candidates.size:
         return None

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from tpm_design.arithmetic import inner, kernel
 from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.indices import condition_at
 
@@ -24,7 +24,7 @@ class Averages:
     least: float
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _at(geometry, mode, frobenius, motor, origin, step, t):  # type: ignore[no-untyped-def]
     return condition_at(
         geometry,
@@ -37,7 +37,7 @@ def _at(geometry, mode, frobenius, motor, origin, step, t):  # type: ignore[no-u
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _threshold_crossing(geometry, mode, frobenius, motor, threshold, origin, step, low, high, below):  # type: ignore[no-untyped-def]
     for _ in range(40):
         t = 0.5 * (low + high)
@@ -48,7 +48,7 @@ def _threshold_crossing(geometry, mode, frobenius, motor, threshold, origin, ste
     return 0.5 * (low + high)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _integrate(
     geometry, mode, frobenius, motor, threshold, origin, scale, directions, weights, segments, nodes
 ):  # type: ignore[no-untyped-def]

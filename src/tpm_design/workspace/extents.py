@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from tpm_design.arithmetic import kernel
 from tpm_design.mechanisms import equations
 from tpm_design.workspace.aspects import RayField
 
 SAMPLES = 9
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _box(geometry, mode, origin, scale, directions, rays, starts, ends):  # type: ignore[no-untyped-def]
     low = np.full(3, math.inf)
     high = np.full(3, -math.inf)

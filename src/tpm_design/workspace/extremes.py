@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tpm_design.arithmetic import inner, kernel
 from tpm_design.workspace.indices import Index, index_value, index_values
 from tpm_design.workspace.region_geometry import POINTS, PlacedRegion, nearest
 
-STARTS = 3
+EIGHTHS = 8
 FINEST_STEP = 1e-7
 ERROR_FLOOR = 1e-10
 
@@ -20,14 +20,16 @@ ERROR_FLOOR = 1e-10
 @dataclass(frozen=True)
 class Extreme:
     """``value`` in the index's unit, ``error``: what half the samples would have missed plus the polish's
-    last gain, ``pose`` (3,) in metres where it is attained."""
+    last gain, ``pose`` (3,) in metres where it is attained. ``pieces``: the extremes found from each eighth
+    of the region, whose least (or greatest) is ``value``: smoother in the design than their minimum."""
 
     value: float
     error: float
     pose: tuple[float, float, float]
+    pieces: tuple[float, ...]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _polish(geometry, mode, region, index, start, value, step, smallest):  # type: ignore[no-untyped-def]
     """Compass search inside the region from ``start``: (value, last decrease, x, y, z)."""
     x, y, z = start[0], start[1], start[2]
@@ -58,10 +60,10 @@ def _polish(geometry, mode, region, index, start, value, step, smallest):  # typ
     return value, last, x, y, z
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _starts(values, points, stride, number, separation):  # type: ignore[no-untyped-def]
     """Indices of the best lattice poses, apart from each other, of every ``stride``-th pose."""
-    chosen = np.full(STARTS, -1, np.int64)
+    chosen = np.full(number, -1, np.int64)
     count = 0
     for _ in range(number):
         best = -1
@@ -86,28 +88,37 @@ def _starts(values, points, stride, number, separation):  # type: ignore[no-unty
     return chosen[:count]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _least(geometry, mode, region, index, points, spacing):  # type: ignore[no-untyped-def]
-    values = index_values(geometry, mode, index, points)
-    smallest = FINEST_STEP * spacing
-    results = np.full(2, math.inf)
-    pose = (points[0, 0], points[0, 1], points[0, 2])
-    last = 0.0
-    if region.form == POINTS:
-        n = int(np.argmin(values))
-        return values[n], 0.0, (points[n, 0], points[n, 1], points[n, 2])
-    for attempt in range(2):
-        chosen = _starts(values, points, 1 + attempt, STARTS - attempt, 2.5 * spacing)
-        for n in chosen:
+@inner
+def _best_of_eighths(region, points, values):  # type: ignore[no-untyped-def]
+    """Index of the best lattice pose in each octant about the region's centre, −1 where there is none."""
+    best = np.full(EIGHTHS, -1, np.int64)
+    for n in range(values.size):
+        eighth = 0
+        for axis in range(3):
+            if points[n, axis] > region.centre[axis]:
+                eighth += 1 << axis
+        if best[eighth] < 0 or values[n] < values[best[eighth]]:
+            best[eighth] = n
+    return best
+
+
+@kernel
+def _chosen(region, points, values, separation):  # type: ignore[no-untyped-def]
+    """Where to polish from: each eighth's best pose, and what every second pose alone would suggest."""
+    return _best_of_eighths(region, points, values), _starts(values, points, 2, 2, separation)
+
+
+@kernel
+def _polished(geometry, mode, region, index, points, values, chosen, step, smallest):  # type: ignore[no-untyped-def]
+    """(value, last decrease, x, y, z) (K, 5) from each chosen pose; rows of +inf where it is −1."""
+    out = np.full((chosen.size, 5), math.inf)
+    for k in range(chosen.size):
+        n = chosen[k]
+        if n >= 0:
             start = (points[n, 0], points[n, 1], points[n, 2])
-            value, step, x, y, z = _polish(
-                geometry, mode, region, index, start, values[n], 0.5 * spacing, smallest
-            )
-            if value < results[attempt]:
-                results[attempt] = value
-                if value < min(results[0], results[1 - attempt]) or attempt == 0:
-                    pose, last = (x, y, z), step
-    return min(results[0], results[1]), abs(results[0] - results[1]) + last, pose
+            value, gain, x, y, z = _polish(geometry, mode, region, index, start, values[n], step, smallest)
+            out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = value, gain, x, y, z
+    return out
 
 
 def least_over_region(
@@ -122,8 +133,26 @@ def least_over_region(
 
     ``points`` (N, 3): the region's lattice; ``spacing`` (m) between its poses.
     """
-    value, error, pose = _least(geometry, signs, region, index, points, spacing)
+    values = index_values(geometry, signs, index, points)
+    if region.form == POINTS:
+        n = int(values.argmin())
+        value, error, pose, pieces = values[n], 0.0, points[n], np.full(EIGHTHS, values[n])
+    else:
+        chosen = np.concatenate(_chosen(region, points, values, 2.5 * spacing))
+        found = _polished(
+            geometry, signs, region, index, points, values, chosen, 0.5 * spacing, FINEST_STEP * spacing
+        )
+        best = int(found[:, 0].argmin())
+        value, pose = found[best, 0], found[best, 2:]
+        error = found[EIGHTHS:, 0].min() - value + found[best, 1]
+        pieces = np.where(np.isfinite(found[:EIGHTHS, 0]), found[:EIGHTHS, 0], value)
+        pieces[pieces.argmin()] = value
     # shrinks with the lattice, so that a finer look at the same pose never contradicts a coarser one
     longest = 2.0 * max(region.half)
     floor = ERROR_FLOOR * abs(value) * (min(1.0, spacing / longest) if longest > 0.0 else 1.0)
-    return Extreme(index.sign * value, error + floor, (float(pose[0]), float(pose[1]), float(pose[2])))
+    return Extreme(
+        float(index.sign * value),
+        float(error + floor),
+        (float(pose[0]), float(pose[1]), float(pose[2])),
+        tuple((index.sign * pieces).tolist()),
+    )

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.pointwise import least_margin
 from tpm_design.mechanisms.velocity import (
@@ -46,18 +46,18 @@ class Index(NamedTuple):
     sign: float = 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def determinant_at(geometry, mode, part, x, y, z):  # type: ignore[no-untyped-def]
     """One signed determinant."""
     return equations.singularity_margins(geometry, mode, x, y, z)[part]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _velocity(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
     return equations.velocity_map(geometry, mode, motor, x, y, z)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def condition_at(geometry, mode, frobenius, motor, x, y, z):  # type: ignore[no-untyped-def]
     """1/κ in the 2-norm or the Frobenius norm; 0 at every singularity and where undefined."""
     rows, b = _velocity(geometry, mode, motor, x, y, z)
@@ -65,14 +65,14 @@ def condition_at(geometry, mode, frobenius, motor, x, y, z):  # type: ignore[no-
     return value if value == value else 0.0  # noqa: PLR0124
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _transmission(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     rows, _ = _velocity(geometry, mode, 0.0, x, y, z)
     entering = least_margin(equations.input_transmission(geometry, mode, x, y, z))
     return min(entering, output_transmission(_unit_rows(rows)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _unit_rows(rows):  # type: ignore[no-untyped-def]
     a, b, c = rows
     u = 1.0 / math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
@@ -85,7 +85,7 @@ def _unit_rows(rows):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _sensitivity(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
     """Greatest singular value of A⁻¹ diag(gains): the length errors' coefficients are orthogonal between
     limbs, so their Gram matrix is diagonal."""
@@ -94,17 +94,17 @@ def _sensitivity(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def
     return singular_values(rows, gains)[0]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _clearance(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     return equations.limb_clearance(geometry, mode, x, y, z)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _actuator(geometry, mode, motor, part, x, y, z):  # type: ignore[no-untyped-def]
     return equations.actuators(geometry, mode, motor, x, y, z)[part]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _extent(geometry, mode, axis, sign, x, y, z):  # type: ignore[no-untyped-def]
     """Lowest (sign +1) or highest (sign −1) coordinate of all joint centres along an axis."""
     least = math.inf
@@ -114,48 +114,41 @@ def _extent(geometry, mode, axis, sign, x, y, z):  # type: ignore[no-untyped-def
     return sign * least
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _plain(geometry, mode, index, x, y, z):  # type: ignore[no-untyped-def]
-    quantity = index.quantity
-    if quantity == REACH:
-        return workspace_margin(geometry, mode, x, y, z)
-    if quantity == LEGS:
-        return least_margin(equations.leg_margins(geometry, mode, x, y, z))
-    if quantity == DETERMINANT:
-        return determinant_at(geometry, mode, index.part, x, y, z)
-    if quantity == SINGULARITY:
-        return abs(determinant_at(geometry, mode, index.part, x, y, z))
-    if quantity == SERIAL:
-        return least_margin(equations.serial_margins(geometry, mode, x, y, z))
-    if quantity == CONDITION_2:
-        return condition_at(geometry, mode, False, index.motor, x, y, z)
-    if quantity == CONDITION_FROBENIUS:
-        return condition_at(geometry, mode, True, index.motor, x, y, z)
-    if quantity == FASTEST:
-        rows, b = _velocity(geometry, mode, index.motor, x, y, z)
-        return singular_values(rows, b)[0]
-    if quantity == SLOWEST:
-        rows, b = _velocity(geometry, mode, index.motor, x, y, z)
-        return singular_values(rows, b)[1]
-    if quantity == TRANSMISSION:
-        return _transmission(geometry, mode, x, y, z)
-    if quantity == SENSITIVITY:
-        return _sensitivity(geometry, mode, index.motor, x, y, z)
-    if quantity == CLEARANCE:
-        return _clearance(geometry, mode, x, y, z)
-    if quantity == ACTUATOR:
-        return _actuator(geometry, mode, index.motor, index.part, x, y, z)
-    return _extent(geometry, mode, index.part, index.sign, x, y, z)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def index_value(geometry, mode, index, x, y, z):  # type: ignore[no-untyped-def]
     """sign · field at a pose; +inf where undefined, so that it never is the least."""
-    value = index.sign * _plain(geometry, mode, index, x, y, z)
-    return value if value == value else math.inf  # noqa: PLR0124
+    quantity = index.quantity
+    if quantity == REACH:
+        value = workspace_margin(geometry, mode, x, y, z)
+    elif quantity == LEGS:
+        value = least_margin(equations.leg_margins(geometry, mode, x, y, z))
+    elif quantity == DETERMINANT:
+        value = determinant_at(geometry, mode, index.part, x, y, z)
+    elif quantity == SINGULARITY:
+        value = abs(determinant_at(geometry, mode, index.part, x, y, z))
+    elif quantity == SERIAL:
+        value = least_margin(equations.serial_margins(geometry, mode, x, y, z))
+    elif quantity == CONDITION_2 or quantity == CONDITION_FROBENIUS:  # noqa: PLR1714
+        value = condition_at(geometry, mode, quantity == CONDITION_FROBENIUS, index.motor, x, y, z)
+    elif quantity == FASTEST or quantity == SLOWEST:  # noqa: PLR1714
+        rows, b = _velocity(geometry, mode, index.motor, x, y, z)
+        greatest, least = singular_values(rows, b)
+        value = greatest if quantity == FASTEST else least
+    elif quantity == TRANSMISSION:
+        value = _transmission(geometry, mode, x, y, z)
+    elif quantity == SENSITIVITY:
+        value = _sensitivity(geometry, mode, index.motor, x, y, z)
+    elif quantity == CLEARANCE:
+        value = _clearance(geometry, mode, x, y, z)
+    elif quantity == ACTUATOR:
+        value = _actuator(geometry, mode, index.motor, index.part, x, y, z)
+    else:
+        value = _extent(geometry, mode, index.part, index.sign, x, y, z)
+    signed = index.sign * value
+    return signed if signed == signed else math.inf  # noqa: PLR0124
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def index_values(geometry, mode, index, points):  # type: ignore[no-untyped-def]
     """``index_value`` at poses (N, 3)."""
     out = np.empty(points.shape[0])

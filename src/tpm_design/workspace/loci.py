@@ -13,9 +13,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms.pointwise import reach_row, singularity_row
 from tpm_design.workspace.indices import determinant_at
 from tpm_design.workspace.poses import workspace_margin
@@ -40,14 +40,14 @@ class LocusDistance:
     pose: tuple[float, float, float] | None
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _along(geometry, mode, part, base, normal, t):  # type: ignore[no-untyped-def]
     return determinant_at(
         geometry, mode, part, base[0] + t * normal[0], base[1] + t * normal[1], base[2] + t * normal[2]
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _crossing(geometry, mode, part, base, normal, low, high):  # type: ignore[no-untyped-def]
     """Way along a feeler at which the determinant changes sign, by bisection."""
     positive = _along(geometry, mode, part, base, normal, low) > 0.0
@@ -60,7 +60,7 @@ def _crossing(geometry, mode, part, base, normal, low, high):  # type: ignore[no
     return 0.5 * (low + high)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _exit(geometry, mode, base, normal, low, high):  # type: ignore[no-untyped-def]
     """Last way along a feeler that is still reachable, between ``low`` (reachable) and ``high``."""
     for _ in range(26):
@@ -75,7 +75,7 @@ def _exit(geometry, mode, base, normal, low, high):  # type: ignore[no-untyped-d
     return low
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _march(geometry, mode, determinant_count, part, bases, normals, step, limit):  # type: ignore[no-untyped-def]
     """Ways (F,) along the feelers to the first locus of one determinant; +inf where none was met before
     the march ended: one level after the first was met, or at ``limit``.
@@ -116,7 +116,7 @@ def _march(geometry, mode, determinant_count, part, bases, normals, step, limit)
     return ways
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _meeting(geometry, mode, part, base, normal, low, high, flipped, inside):  # type: ignore[no-untyped-def]
     """Way at which a feeler meets the locus between two levels within closed reach, else +inf."""
     if not flipped:
@@ -134,7 +134,7 @@ def _meeting(geometry, mode, part, base, normal, low, high, flipped, inside):  #
     return t if margin >= -REACH_TOLERANCE else math.inf
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _gradient(geometry, mode, part, x, y, z, step):  # type: ignore[no-untyped-def]
     gx = determinant_at(geometry, mode, part, x + step, y, z) - determinant_at(
         geometry, mode, part, x - step, y, z
@@ -149,7 +149,7 @@ def _gradient(geometry, mode, part, x, y, z, step):  # type: ignore[no-untyped-d
     return gx, gy, gz, size
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _onto_locus(geometry, mode, part, point, normal, width):  # type: ignore[no-untyped-def]
     """(found, x, y, z): the point moved along ``normal`` onto the locus, by at most about ``width``."""
     x, y, z = point
@@ -172,7 +172,7 @@ def _onto_locus(geometry, mode, part, point, normal, width):  # type: ignore[no-
     return abs(g1) <= 1e-10, x + t1 * normal[0], y + t1 * normal[1], z + t1 * normal[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _try(geometry, mode, region, part, point, normal, width, best):  # type: ignore[no-untyped-def]
     found, x, y, z = _onto_locus(geometry, mode, part, point, normal, width)
     if found and workspace_margin(geometry, mode, x, y, z) >= -REACH_TOLERANCE:
@@ -182,7 +182,7 @@ def _try(geometry, mode, region, part, point, normal, width, best):  # type: ign
     return best, math.nan, math.nan, math.nan
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore[no-untyped-def]
     """Least signed distance along the locus from ``start``: (distance, x, y, z).
 
@@ -244,7 +244,7 @@ def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore
     return best, x, y, z
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _perpendicular(normal):  # type: ignore[no-untyped-def]
     """A unit vector perpendicular to a unit vector."""
     nx, ny, nz = normal
@@ -258,7 +258,7 @@ def _perpendicular(normal):  # type: ignore[no-untyped-def]
     return -ny / size, nx / size, 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _best_slide(geometry, mode, region, part, starts, distances, stride, step, smallest):  # type: ignore[no-untyped-def]
     """Slide from the nearest starts that lie apart; ``stride`` skips starts."""
     best, bx, by, bz = math.inf, math.nan, math.nan, math.nan
@@ -287,7 +287,7 @@ def _best_slide(geometry, mode, region, part, starts, distances, stride, step, s
     return best, bx, by, bz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _signed_distances(region, points):  # type: ignore[no-untyped-def]
     out = np.empty(points.shape[0])
     for n in range(points.shape[0]):

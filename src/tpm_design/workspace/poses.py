@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.pointwise import least_margin
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def workspace_margin(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """Metres, ≥ 0 where the pose is reachable in the mode."""
     legs = least_margin(equations.leg_margins(geometry, mode, x, y, z))
     return min(legs, least_margin(equations.mode_margins(geometry, mode, x, y, z)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def side_code(geometry, mode, floor, x, y, z):  # type: ignore[no-untyped-def]
     """0 where a determinant's margin is not above ``floor``, else 1 + one bit per positive determinant."""
     code = 1
@@ -31,7 +30,15 @@ def side_code(geometry, mode, floor, x, y, z):  # type: ignore[no-untyped-def]
     return code
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
+def aspect_code(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """``side_code`` of a reachable pose, 0 of any other."""
+    if workspace_margin(geometry, mode, x, y, z) < 0.0:
+        return 0
+    return side_code(geometry, mode, 0.0, x, y, z)
+
+
+@inner
 def side_margin(geometry, mode, code, floor, x, y, z):  # type: ignore[no-untyped-def]
     """≥ 0 where every determinant has the sign ``code`` (> 0) says, beyond ``floor``."""
     least = math.inf

@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tpm_design.arithmetic import inner
 from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere
 
 BOX, CYLINDER, ELLIPSOID, POINTS = 0, 1, 2, 3
@@ -37,7 +37,7 @@ def place(shape: Shape, centre: tuple[float, float, float]) -> PlacedRegion:
     return PlacedRegion(form, at, (float(half[0]), float(half[1]), float(half[2])), points + np.asarray(at))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _ellipsoid_foot(half, x, y, z):  # type: ignore[no-untyped-def]
     """Nearest point of the ellipsoid's surface to a point (about its centre).
 
@@ -73,7 +73,7 @@ def _ellipsoid_foot(half, x, y, z):  # type: ignore[no-untyped-def]
     return a * x / (a + t), b * y / (b + t), c * z / (c + t)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _nearest_index(points, x, y, z):  # type: ignore[no-untyped-def]
     best, least = 0, math.inf
     for n in range(points.shape[0]):
@@ -83,7 +83,7 @@ def _nearest_index(points, x, y, z):  # type: ignore[no-untyped-def]
     return best, math.sqrt(least)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def signed_distance(region, x, y, z):  # type: ignore[no-untyped-def]
     """Distance (m) to the region's surface, negative inside."""
     if region.form == POINTS:
@@ -105,7 +105,7 @@ def signed_distance(region, x, y, z):  # type: ignore[no-untyped-def]
     return outside if outside > 0.0 else max(ex, max(ey, ez))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def nearest(region, x, y, z):  # type: ignore[no-untyped-def]
     """The region's point nearest to a pose; the pose itself inside."""
     if region.form == POINTS:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 
 @dataclass(frozen=True)
@@ -42,3 +44,26 @@ class Points:
 
 
 Shape = Box | Cylinder | Sphere | Ellipsoid | Points
+
+
+@dataclass(frozen=True)
+class RegionForm:
+    """One kind of region as studies name it."""
+
+    name: str
+    keys: str
+    description: str
+
+
+REGIONS: Mapping[str, RegionForm] = MappingProxyType(
+    {
+        form.name: form
+        for form in (
+            RegionForm("box", "size: [x, y, z]", "axis-aligned box with these edges"),
+            RegionForm("cylinder", "radius, height", "solid cylinder, its axis along z"),
+            RegionForm("sphere", "radius", "solid ball"),
+            RegionForm("ellipsoid", "semi_axes: [x, y, z]", "solid ellipsoid with these half axes"),
+            RegionForm("points", "file: poses.csv", "isolated poses, columns x, y, z, about the centre"),
+        )
+    }
+)

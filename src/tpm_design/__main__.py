@@ -1,0 +1,5 @@
+"""`python -m tpm_design`."""
+
+from tpm_design.cli import main
+
+main()

@@ -1,0 +1,163 @@
+"""The commands and their options."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tpm_design.cli.guard import guarded
+
+app = typer.Typer(
+    name="tpm-design",
+    help="Dimensions for translational parallel robots: reachable, well conditioned, far from singularities.",
+    epilog="Start with `tpm-design init`, then `tpm-design optimize study.yaml` and `tpm-design report`.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Study = Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (YAML).", show_default=False)]
+Json = Annotated[bool, typer.Option("--json", help="Machine-readable output on standard output.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print results only, no progress.")]
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(f"tpm-design {version('tpm-design')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Dimensions for translational parallel robots: reachable, well conditioned, far from singularities.
+
+    Exit codes: 0 done, 1 internal error, 2 wrong usage or invalid study, 3 no feasible design, 130
+    interrupted.
+    """
+
+
+@app.command()
+@guarded
+def init(
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Name of the study.")] = "study",
+    mechanism: Annotated[str, typer.Option(help="Mechanism to start from.")] = "uru",
+) -> int | None:
+    """Write a commented study, NAME.yaml, that runs as it is."""
+    from tpm_design.cli.commands import init_study
+
+    return init_study(name, mechanism)
+
+
+@app.command()
+@guarded
+def validate(
+    study: Study,
+    resolved: Annotated[bool, typer.Option("--resolved", help="Print the study with every default.")] = False,
+    quiet: Quiet = False,
+) -> int | None:
+    """Check a study completely; run nothing."""
+    from tpm_design.cli.commands import validate_study
+
+    return validate_study(study, resolved=resolved, quiet=quiet)
+
+
+@app.command()
+@guarded
+def schema() -> int | None:
+    """Print the JSON Schema of study files, for editors."""
+    from tpm_design.cli.commands import print_schema
+
+    return print_schema()
+
+
+@app.command("list")
+@guarded
+def list_(
+    what: Annotated[
+        str | None,
+        typer.Argument(metavar="[WHAT]", help="mechanisms, metrics, optimizers or regions; all if left out."),
+    ] = None,
+    as_json: Json = False,
+) -> int | None:
+    """List mechanisms, metrics, optimizers and regions."""
+    from tpm_design.cli.catalogue import list_things
+
+    return list_things(what, as_json=as_json)
+
+
+@app.command()
+@guarded
+def show(
+    name: Annotated[str, typer.Argument(help="A mechanism, metric, optimizer or region.")],
+    as_json: Json = False,
+) -> int | None:
+    """Explain one of them: parameters, units, options, source of its equations."""
+    from tpm_design.cli.catalogue import show_thing
+
+    return show_thing(name, as_json=as_json)
+
+
+@app.command()
+@guarded
+def evaluate(
+    study: Annotated[Path, typer.Argument(metavar="STUDY|RUN", help="Study file or run folder.")],
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Value in the study's units; may be repeated."),
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="Joint values, Jacobian and margins at this pose instead."),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int | None:
+    """Evaluate one design: every metric with its unit and numeric error."""
+    from tpm_design.cli.commands import evaluate_one
+
+    return evaluate_one(study, settings or [], at, as_json=as_json, quiet=quiet)
+
+
+@app.command()
+@guarded
+def optimize(
+    study: Study,
+    seed: Annotated[int | None, typer.Option(help="Seed of random methods, instead of the study's.")] = None,
+    budget: Annotated[int | None, typer.Option(help="Number of evaluations, instead of the study's.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Threads; one per processor if left out.")] = None,
+    output: Annotated[Path, typer.Option(metavar="DIR", help="Folder for run folders.")] = Path("results"),
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int | None:
+    """Search the design space of a study; the run is written below results/."""
+    from tpm_design.cli.commands import optimize_one
+
+    return optimize_one(study, seed, budget, workers, output, as_json=as_json, quiet=quiet)
+
+
+@app.command()
+@guarded
+def report(
+    runs: Annotated[
+        list[Path] | None, typer.Argument(metavar="[RUN ...]", help="Run folders; the newest if left out.")
+    ] = None,
+    quiet: Quiet = False,
+) -> int | None:
+    """Write report.md and figures/*.png into run folders."""
+    from tpm_design.cli.commands import report_runs
+
+    return report_runs(runs or [], quiet=quiet)
+
+
+def main() -> None:
+    """Entry point of `tpm-design`."""
+    app()

@@ -1,0 +1,237 @@
+"""What the commands do. Each returns its exit code, None for 0."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+
+from collections.abc import Sequence
+
+from pathlib import Path
+from typing import Any
+
+from tpm_design.cli.guard import INTERRUPTED, NOTHING_FEASIBLE
+from tpm_design.cli.progress import search_progress
+from tpm_design.cli.results import design_rows, evaluation_data, limit_text, result_text
+from tpm_design.cli.text import table
+from tpm_design.errors import UsageError
+from tpm_design.mechanisms import mechanism_kind
+from tpm_design.problem import Design, evaluate
+from tpm_design.runs.folder import STUDY, newest_run, read_run
+from tpm_design.runs.optimize import check_plan
+from tpm_design.study import Study, choose_design, dump_yaml, load_study, study_schema, template
+from tpm_design.study.actions import optimize_study, plan_of, pose_values
+from tpm_design.units import unit_for
+
+RESULTS = Path("results")
+
+
+def init_study(name: str, mechanism: str) -> int | None:
+    text = template(name, mechanism_kind(mechanism))
+    path = Path(f"{name}.yaml")
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise UsageError(
+            "This file exists already.", where=str(path), remedy="Choose another name, or remove it."
+        ) from None
+    except OSError as error:
+        raise UsageError(f"This file cannot be written: {error.strerror}.", where=str(path)) from None
+    print(f"Wrote {path}. Next: tpm-design optimize {path}")
+    return None
+
+
+def validate_study(path: Path, *, resolved: bool, quiet: bool) -> int | None:
+    study = load_study(path)
+    if study.problem.variables and len(study.problem.objectives) == 1:
+        check_plan(study.problem, plan_of(study))
+    if resolved:
+        print(dump_yaml(study.resolved()), end="")
+    elif not quiet:
+        problem = study.problem
+        print(
+            f"{path} is valid: {problem.kind.title}, {len(problem.variables)} free quantities, "
+            f"{len(problem.objectives)} objectives, {len(problem.constraints)} constraints."
+        )
+    return None
+
+
+def print_schema() -> int | None:
+    print(json.dumps(study_schema(), indent=2, ensure_ascii=False))
+    return None
+
+
+def open_study(path: Path) -> tuple[Study, Design | None]:
+    """A study from its file, or from a run folder with the run's best design."""
+    if not path.is_dir():
+        return load_study(path), None
+    run = read_run(path)
+    study = load_study(path / STUDY)
+    if run.best is None:
+        raise UsageError(
+            "This run has no best design.", where=str(path), remedy="Evaluate its study.yaml instead."
+        )
+    return study, run.best.evaluation.design
+
+
+def evaluate_one(
+    path: Path, settings: Sequence[str], at: str | None, *, as_json: bool, quiet: bool
+) -> int | None:
+    study, stored = open_study(path)
+    given = _settings(settings)
+    design, assumptions = choose_design(study, given)
+    if stored is not None:
+        design = {**stored, **{name: design[name] for name in given}}
+        assumptions = ()
+    pose = None if at is None else _pose(study, at)
+    if pose is not None:
+        return _print_pose(study, design, pose, as_json=as_json)
+    result = evaluate(study.problem, design)
+    if as_json:
+        data = {"study": study.name, "assumed": list(assumptions)}
+        print(json.dumps({**data, **evaluation_data(study.problem, study.units, result)}, ensure_ascii=False))
+        return None
+    if assumptions and not quiet:
+        print("Assumed: " + "; ".join(assumptions) + ".\n")
+    print(result_text(study.problem, study.units, result))
+    if result.status != "failed":
+        print(f"\nThis design is {result.status}; violation {result.violation:.4g}.")
+    return None
+
+
+def _settings(texts: Sequence[str]) -> dict[str, str]:
+    settings: dict[str, str] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip():
+            raise UsageError(f"{text!r} sets nothing.", where="--set", remedy="Write --set name=value.")
+        if name.strip() in settings:
+            raise UsageError(f"{name.strip()} is set twice.", where="--set", remedy="Set it once.")
+        settings[name.strip()] = value
+    return settings
+
+
+def _pose(study: Study, text: str) -> tuple[float, float, float]:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+        raise UsageError(
+            f"{text!r} is not a pose.", where="--at", remedy=f"Write --at x,y,z in {study.units.length}."
+        )
+    x, y, z = (study.units.to_si(number, "m") for number in numbers)
+    return x, y, z
+
+
+def _print_pose(
+    study: Study, design: Design, pose: tuple[float, float, float], *, as_json: bool
+) -> int | None:
+    units, kind = study.units, study.problem.kind
+    values = pose_values(study, design, pose)
+    rate = unit_for("m/rad or -", kind.actuator_unit)
+
+    def converted(array: Any, unit: str) -> Any:
+        if isinstance(array, list):
+            return [converted(item, unit) for item in array]
+        return None if array is None else units.from_si(array, unit)
+
+    data = {
+        "pose": {"value": converted(list(pose), "m"), "unit": units.name("m")},
+        "actuators": {
+            drive: {"value": converted(q, kind.actuator_unit), "unit": units.name(kind.actuator_unit)}
+            for drive, q in values["actuators"].items()
+        },
+        "jacobian": {
+            drive: {"value": converted(matrix, rate), "unit": units.name(rate)}
+            for drive, matrix in values["jacobian"].items()
+        },
+        "margins": {
+            name: {
+                "value": converted(value, "m" if name == "reach" else "-"),
+                "unit": units.name("m" if name == "reach" else "-"),
+            }
+            for name, value in values["margins"].items()
+        },
+    }
+    if as_json:
+        print(json.dumps(data, ensure_ascii=False))
+        return None
+    print(table(["design", "value", ""], [row[:2] + [""] for row in design_rows(study.problem, units, _bare(design))]))
+    rows = []
+    for drive, entry in data["actuators"].items():
+        rows.append([f"{drive} coordinates [{entry['unit']}]", _row_text(entry["value"])])
+    for drive, entry in data["jacobian"].items():
+        for axis, row in zip(kind.pose, entry["value"], strict=True):
+            rows.append([f"Jacobian of the {drive}s, {axis} [{entry['unit']}]", _row_text(row)])
+    for name, entry in data["margins"].items():
+        rows.append([f"margin: {name} [{entry['unit']}]", _row_text([entry["value"]])])
+    print("\n" + table([f"at {_row_text(data['pose']['value'])} {units.length}", "value"], rows))
+    if values["actuators"][kind.drives[0]][0] is None:
+        print("\nThis pose is not reachable in the working mode.")
+    return None
+
+
+def _bare(design: Design) -> Any:
+    from tpm_design.problem import Evaluation
+
+    return Evaluation(design, {}, {}, {}, {}, {}, 0.0, "feasible", "", 0.0)
+
+
+def _row_text(values: Sequence[float | None]) -> str:
+    return "  ".join("–" if value is None else f"{value:.8g}" for value in values)
+
+
+def optimize_one(
+    path: Path,
+    seed: int | None,
+    budget: int | None,
+    workers: int | None,
+    output: Path,
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> int | None:
+    if workers is not None and workers < 1:
+        raise UsageError(
+            f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
+        )
+    study = load_study(path).searched_with(seed=seed, budget=budget)
+    check_plan(study.problem, plan_of(study))
+    with search_progress(study.problem, study.units, study.optimizer.budget, quiet=quiet or as_json) as watch:
+        run = optimize_study(study, workers=workers or usable_processors(), output=output, watch=watch)
+    feasible = run.best is not None and run.best.status == "feasible"
+    if as_json:
+        data: dict[str, Any] = {"study": study.name, "run": str(run.folder), "status": run.status}
+        if run.best is not None:
+            data["best"] = evaluation_data(study.problem, study.units, run.best)
+        print(json.dumps(data, ensure_ascii=False))
+    else:
+        if run.best is not None and run.result.best is not None:
+            print(result_text(study.problem, study.units, run.best))
+            print("\n" + limit_text(study.problem, run.result.best))
+        print(run.status)
+        for remark in run.result.remarks:
+            print(remark)
+        print(f"Run: {run.folder}\nNext: tpm-design report {run.folder}")
+    if run.result.ending == "interrupted":
+        return INTERRUPTED
+    return None if feasible else NOTHING_FEASIBLE
+
+
+def usable_processors() -> int:
+    """Processors this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity else (os.cpu_count() or 1)
+
+
+def report_runs(runs: Sequence[Path], *, quiet: bool) -> int | None:
+    from tpm_design.report import write_report
+
+    for folder in runs or [newest_run(RESULTS)]:
+        for path in write_report(folder):
+            if not quiet:
+                print(path)
+    return None

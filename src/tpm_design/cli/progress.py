@@ -1,0 +1,81 @@
+"""Progress of a search: a bar on a terminal, otherwise a line now and then, on standard error."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from tpm_design.problem import Problem
+from tpm_design.runs.search import Entry, minimised
+from tpm_design.runs.tables import goal_unit
+from tpm_design.units import Units
+
+SECONDS_BETWEEN_LINES = 10.0
+
+
+@contextmanager
+def search_progress(
+    problem: Problem, units: Units, budget: int, *, quiet: bool
+) -> Iterator[Callable[[Entry], None]]:
+    """A function to be called with each evaluation."""
+    best = _Best(problem, units)
+    if quiet:
+        yield lambda entry: None
+    elif sys.stderr.isatty():
+        with _bar(budget, best) as watch:
+            yield watch
+    else:
+        yield _lines(budget, best)
+
+
+class _Best:
+    """The best objective so far, as text."""
+
+    def __init__(self, problem: Problem, units: Units) -> None:
+        self._problem, self._units = problem, units
+        self._goal = problem.objectives[0]
+        self._feasible = float("inf")
+        self._violation = float("inf")
+
+    def update(self, entry: Entry) -> str:
+        if entry.evaluation.status == "feasible":
+            self._feasible = min(self._feasible, minimised(self._problem, entry.evaluation))
+        self._violation = min(self._violation, entry.evaluation.violation)
+        if self._feasible < float("inf"):
+            sign = 1.0 if self._goal.sense == "minimize" else -1.0
+            value = sign * self._feasible * self._goal.metric.scale
+            return f"best {self._goal.label} {self._units.written(value, goal_unit(self._problem, self._goal))}"
+        return f"none feasible yet, least violation {self._violation:.3g}"
+
+
+@contextmanager
+def _bar(budget: int, best: _Best) -> Iterator[Callable[[Entry], None]]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    with Progress(
+        TextColumn("evaluations"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
+        console=Console(stderr=True),
+        transient=True,
+    ) as progress:
+        task = progress.add_task("compiling the equations on first use", total=budget)
+        yield lambda entry: progress.update(task, completed=entry.number + 1, description=best.update(entry))
+
+
+def _lines(budget: int, best: _Best) -> Callable[[Entry], None]:
+    last = time.monotonic()
+
+    def watch(entry: Entry) -> None:
+        nonlocal last
+        text = best.update(entry)
+        if time.monotonic() - last >= SECONDS_BETWEEN_LINES:
+            last = time.monotonic()
+            print(f"{entry.number + 1} of {budget} evaluations, {text}", file=sys.stderr, flush=True)
+
+    return watch

@@ -1,0 +1,162 @@
+"""How designs and their metrics are shown: as text with units and errors, or as data for --json."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from tpm_design.cli.text import table
+from tpm_design.problem import Evaluation, Goal, Problem
+from tpm_design.runs.optimize import binding
+from tpm_design.runs.search import Entry
+from tpm_design.runs.tables import goal_unit, parameter_columns
+from tpm_design.units import Units
+
+NO_VALUE = "–"
+
+
+def design_rows(problem: Problem, units: Units, evaluation: Evaluation) -> list[list[str]]:
+    """Quantity, value with unit, and the range it was searched in."""
+    ranges = {variable.name: variable for variable in problem.variables}
+    rows = []
+    for column in parameter_columns(problem, units):
+        value = evaluation.design[column.name]
+        text = value if isinstance(value, str) else units.written(value, column.unit)
+        variable = ranges.get(column.name)
+        if variable is None:
+            searched = "fixed"
+        elif variable.values:
+            searched = "one of " + ", ".join(
+                v if isinstance(v, str) else units.written(v, column.unit) for v in variable.values
+            )
+        else:
+            low, high = units.written(variable.lower, column.unit), units.written(variable.upper, column.unit)
+            searched = f"{low} … {high}"
+        rows.append([column.name, text, searched])
+    return rows
+
+
+def metric_rows(problem: Problem, units: Units, evaluation: Evaluation) -> list[list[str]]:
+    """Metric, value with unit, numeric error, what was asked, slack."""
+    goals = (*problem.objectives, *problem.constraints, *problem.record)
+    return [_metric_row(problem, units, evaluation, goal) for goal in goals]
+
+
+def _metric_row(problem: Problem, units: Units, evaluation: Evaluation, goal: Goal) -> list[str]:
+    unit = goal_unit(problem, goal)
+    value = evaluation.metrics.get(goal.label, math.nan)
+    error = evaluation.errors.get(goal.label, math.nan)
+    note = "; ".join(
+        f"{name}: {text}" for name, text in evaluation.notes.items() if name.startswith(f"{goal.label}_")
+    )
+    return [
+        goal.label,
+        units.written(value, unit) if math.isfinite(value) else NO_VALUE,
+        f"± {error_text(units, error, unit)}" if math.isfinite(value) else NO_VALUE,
+        asked(goal, units, unit),
+        _slack_text(problem, units, evaluation, goal, unit),
+        note.removeprefix(f"{goal.label}_"),
+    ]
+
+
+def error_text(units: Units, error: float, unit: str) -> str:
+    """A numeric error in the study's units, two digits; exact values say so."""
+    return "0" if error == 0.0 else units.written(error, unit, digits=2)
+
+
+def asked(goal: Goal, units: Units, unit: str) -> str:
+    """What the study asks of a metric."""
+    if goal.sense is not None:
+        return goal.sense
+    bounds = []
+    if goal.minimum is not None:
+        bounds.append(f"≥ {units.written(goal.minimum, unit)}")
+    if goal.maximum is not None:
+        bounds.append(f"≤ {units.written(goal.maximum, unit)}")
+    return " and ".join(bounds) or "recorded"
+
+
+def _slack_text(problem: Problem, units: Units, evaluation: Evaluation, goal: Goal, unit: str) -> str:
+    if goal.label not in evaluation.slacks:
+        return ""
+    slack = evaluation.slacks[goal.label]
+    word = "met" if slack >= 0.0 else "MISSED"
+    return f"{word} by {units.written(abs(slack), unit, digits=3)}"
+
+
+def result_text(problem: Problem, units: Units, evaluation: Evaluation) -> str:
+    """A design and all its metrics as two tables."""
+    design = table(["design", "value", "searched in"], design_rows(problem, units, evaluation))
+    if evaluation.status == "failed":
+        return f"{design}\n\nThis design cannot be evaluated: {evaluation.reason}"
+    rows = metric_rows(problem, units, evaluation)
+    metrics = table(["metric", "value", "numeric error", "asked", "constraint", "note"], rows)
+    reasons = f"\n{evaluation.reason}" if "undefined" in evaluation.reason or NO_VALUE in metrics else ""
+    return f"{design}\n\n{metrics}{reasons}"
+
+
+def limit_text(problem: Problem, entry: Entry) -> str:
+    """What limits a design: the constraints within a hundredth of their scale of their bound, or the least
+    slack."""
+    found = binding(problem, entry)
+    if found is None:
+        return "No constraint limits the design."
+    close = [
+        goal.label
+        for goal in problem.constraints
+        if abs(entry.evaluation.slacks.get(goal.label, math.inf)) <= 0.01 * goal.metric.scale
+    ]
+    edges = _at_bounds(problem, entry.evaluation)
+    parts = []
+    if close:
+        parts.append("constraints at their bound: " + ", ".join(close))
+    if edges:
+        parts.append("ranges at their end: " + ", ".join(edges))
+    if not parts:
+        parts.append(f"nothing binds; the nearest constraint is {found[0].label}")
+    return "Limited by " + "; ".join(parts) + "." if close or edges else parts[0].capitalize() + "."
+
+
+def _at_bounds(problem: Problem, evaluation: Evaluation) -> list[str]:
+    names = []
+    for variable in problem.variables:
+        if variable.values:
+            continue
+        value, width = abs(float(evaluation.design[variable.name])), variable.upper - variable.lower
+        signed = value if variable.mirrored else float(evaluation.design[variable.name])
+        if min(signed - variable.lower, variable.upper - signed) <= 1e-6 * width:
+            names.append(variable.name)
+    return names
+
+
+def evaluation_data(problem: Problem, units: Units, evaluation: Evaluation) -> dict[str, Any]:
+    """One evaluation for --json, in the study's units, units beside every number."""
+    design = {}
+    for column in parameter_columns(problem, units):
+        value = evaluation.design[column.name]
+        if isinstance(value, str):
+            design[column.name] = {"value": value}
+        else:
+            design[column.name] = {"value": units.from_si(value, column.unit), "unit": units.name(column.unit)}
+    goals: Sequence[Goal] = (*problem.objectives, *problem.constraints, *problem.record)
+    metrics = {}
+    for goal in goals:
+        unit = goal_unit(problem, goal)
+        value = evaluation.metrics.get(goal.label, math.nan)
+        metrics[goal.label] = {
+            "value": units.from_si(value, unit) if math.isfinite(value) else None,
+            "error": units.from_si(evaluation.errors[goal.label], unit) if math.isfinite(value) else None,
+            "unit": units.name(unit),
+        }
+        if goal.label in evaluation.slacks:
+            slack = evaluation.slacks[goal.label]
+            metrics[goal.label] |= {"slack": units.from_si(slack, unit), "met": slack >= 0.0}
+    return {
+        "status": evaluation.status,
+        "reason": evaluation.reason,
+        "violation": evaluation.violation if math.isfinite(evaluation.violation) else None,
+        "design": design,
+        "metrics": metrics,
+        "notes": dict(evaluation.notes),
+    }
