@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,21 @@ class DesignSpace:
         return DesignSpace(
             tuple(v for v in self.variables if not v.values), {**self.fixed, **chosen}, self.octants
         )
+
+    def near(self, design: Design, share: float) -> DesignSpace:
+        """The space cut to within ``share`` of each continuous range around a design."""
+        point = self.point(design)
+        narrowed = []
+        for variable, coordinate in zip(self.variables, point, strict=True):
+            if variable.values:
+                narrowed.append(variable)
+                continue
+            width = variable.upper - variable.lower
+            low, high = max(0.0, float(coordinate) - share), min(1.0, float(coordinate) + share)
+            narrowed.append(
+                replace(variable, lower=variable.lower + low * width, upper=variable.lower + high * width)
+            )
+        return replace(self, variables=tuple(narrowed))
 
     def _mirrored(self, design: dict[str, float | str]) -> Design:
         for variable in self.variables:

@@ -115,9 +115,7 @@ def evaluate(problem: Problem, design: Design) -> Evaluation:
     undefined = {label: m.notes[UNDEFINED] for label, m in measurements.items() if UNDEFINED in m.notes}
     pieces = {goal.label: slack_pieces(goal, measurements[goal.label]) for goal in problem.constraints}
     slacks = {label: min(values) for label, values in pieces.items()}
-    short = {
-        goal.label: max(0.0, -slacks[goal.label]) / goal.metric.scale for goal in problem.constraints
-    }
+    short = {goal.label: max(0.0, -slacks[goal.label]) / goal.metric.scale for goal in problem.constraints}
     for goal in problem.objectives:
         if goal.label in undefined:
             short[goal.label] = UNDEFINED_VIOLATION

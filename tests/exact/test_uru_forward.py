@@ -69,7 +69,8 @@ def candidates(machine: Uru, q: Array) -> Array:
     roots = series.roots()
     real = roots[np.abs(roots.imag) < 1e-3 * largest].real
     starts = coordinates(np.abs(real)).real.reshape(-1, 3)
-    return np.array([p for p in map(lambda p: closed(machine, q, p), starts) if p is not None]).reshape(-1, 3)
+    ends = [closed(machine, q, start) for start in starts]
+    return np.array([end for end in ends if end is not None]).reshape(-1, 3)
 
 
 def closed(machine: Uru, q: Array, start: Array) -> Array | None:
@@ -156,12 +157,11 @@ def test_turns_count_for_motors_but_not_for_joints() -> None:
     pose = (0.5, 0.6, 0.4)
     mode = machine.mode(octant="+++", elbows="+++")
     joints = machine.ik([pose], mode, drive="joint")[0]
-    assert same_sets(
-        machine.fk(joints + [2 * math.pi, 0, -4 * math.pi], drive="joint"), machine.fk(joints, drive="joint")
-    )
+    turned = joints + np.array([2.0 * math.pi, 0.0, -4.0 * math.pi])
+    assert same_sets(machine.fk(turned, drive="joint"), machine.fk(joints, drive="joint"))
     shafts = machine.ik([pose], mode)[0]
-    turned = machine.fk(shafts + [2 * math.pi, 0.0, 0.0])
-    assert not len(turned) or np.abs(turned - pose).max(axis=1).min() > 1e-3
+    other = machine.fk(shafts + np.array([2.0 * math.pi, 0.0, 0.0]))
+    assert not (np.abs(other - pose).max(axis=1) < 1e-3).any()
 
 
 def test_joint_limits_exclude_assemblies() -> None:

@@ -39,7 +39,18 @@ def kernel(function: Function) -> Any:
 def inner(function: Function) -> Any:
     """Compile a function that only compiled functions call: without an entry from Python, which takes as
     long to compile as a small function. It is kept on disk inside the kernels that call it."""
-    compiled = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    return _without_entry(function, inline=False)
+
+
+def inlined(function: Function) -> Any:
+    """As ``inner``, for a short function of branch-free arithmetic: a loop that calls it can vectorise."""
+    return _without_entry(function, inline=True)
+
+
+def _without_entry(function: Function, *, inline: bool) -> Any:
+    compiled = njit(
+        nogil=True, error_model="numpy", forceinline=inline, no_cpython_wrapper=True, no_cfunc_wrapper=True
+    )(function)
     compiled.__class__ = _InnerFunction
     return compiled
 

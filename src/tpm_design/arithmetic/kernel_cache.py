@@ -1,8 +1,8 @@
 """Where compiled kernels are kept between runs.
 
 Numba recompiles a cached function when its own file changes, not when a formula it calls in another file
-does. So the cache folder is named by a hash of every source file of the package: any change gives a fresh
-folder. Numba reads its cache folder from the environment once, when it is imported; this module must
+does. So the cache folder is named by a hash of every source file of the rooms that hold compiled code: any change
+there gives a fresh folder. Numba reads its cache folder from the environment once, when it is imported; this module must
 therefore be imported before Numba and imports nothing of it.
 """
 
@@ -20,18 +20,20 @@ from pathlib import Path
 
 from platformdirs import user_cache_dir
 
+ROOMS = ("arithmetic", "mechanisms", "workspace")
 PACKAGE = Path(__file__).resolve().parents[1]
 DAYS_KEPT = 30
 PREFIX = "kernels-"
 
 
 def source_hash(package: Path) -> str:
-    """Hash of the names and bytes of every ``*.py`` file below ``package``, and of Numba's version."""
+    """Hash of the names and bytes of every ``*.py`` file in the ``ROOMS`` of ``package``, and of Numba's
+    version."""
     digest = blake2b(digest_size=10)
     with suppress(PackageNotFoundError):
         digest.update(version("numba").encode())
     digest.update(sys.implementation.cache_tag.encode() if sys.implementation.cache_tag else b"")
-    for source in sorted(package.rglob("*.py")):
+    for source in sorted(file for room in ROOMS for file in (package / room).rglob("*.py")):
         text = source.read_bytes()
         digest.update(f"\0{source.relative_to(package).as_posix()}\0{len(text)}\0".encode())
         digest.update(text)

@@ -159,7 +159,12 @@ def _print_pose(
     if as_json:
         print(json.dumps(data, ensure_ascii=False))
         return None
-    print(table(["design", "value", ""], [row[:2] + [""] for row in design_rows(study.problem, units, _bare(design))]))
+    print(
+        table(
+            ["design", "value", ""],
+            [row[:2] + [""] for row in design_rows(study.problem, units, _bare(design))],
+        )
+    )
     rows = []
     for drive, entry in data["actuators"].items():
         rows.append([f"{drive} coordinates [{entry['unit']}]", _row_text(entry["value"])])

@@ -46,7 +46,9 @@ class _Best:
         if self._feasible < float("inf"):
             sign = 1.0 if self._goal.sense == "minimize" else -1.0
             value = sign * self._feasible * self._goal.metric.scale
-            return f"best {self._goal.label} {self._units.written(value, goal_unit(self._problem, self._goal))}"
+            return (
+                f"best {self._goal.label} {self._units.written(value, goal_unit(self._problem, self._goal))}"
+            )
         return f"none feasible yet, least violation {self._violation:.3g}"
 
 

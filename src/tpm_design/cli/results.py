@@ -138,7 +138,10 @@ def evaluation_data(problem: Problem, units: Units, evaluation: Evaluation) -> d
         if isinstance(value, str):
             design[column.name] = {"value": value}
         else:
-            design[column.name] = {"value": units.from_si(value, column.unit), "unit": units.name(column.unit)}
+            design[column.name] = {
+                "value": units.from_si(value, column.unit),
+                "unit": units.name(column.unit),
+            }
     goals: Sequence[Goal] = (*problem.objectives, *problem.constraints, *problem.record)
     metrics = {}
     for goal in goals:

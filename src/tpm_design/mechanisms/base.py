@@ -69,7 +69,7 @@ class MechanismKind:
     ``build(parameters, limits)``: SI values by name → a mechanism. ``farthest_reach(ranges)``: a bound
     (m) on the distance of any reachable pose from the origin, from the (lowest, highest) SI value of
     every parameter name that is set. ``example``: SI values of a machine that works, for new studies.
-    ``mode_candidates(ranges, center_free)``: sign strings of one working mode of each set that symmetry
+    ``mode_candidates(ranges, isotropic)``: sign strings of one working mode of each set that symmetry
     makes equal for every design of the ranges; None: all modes count as different.
     """
 

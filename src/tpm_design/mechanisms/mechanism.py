@@ -59,7 +59,7 @@ class Mechanism(ABC):
         x, y, z = pointwise.columns(_poses(points))
         out = np.empty((x.size, 3))
         pointwise.actuators_row(self.geometry, mode.signs, self.motor_weight(drive), x, y, z, out)
-        out[~self._usable(x, y, z, mode)] = np.nan
+        out[~self._usable(x, y, z, mode) | ~np.isfinite(out).all(axis=1)] = np.nan
         return out
 
     def jacobian(self, points: ArrayLike, mode: Mode, *, drive: str = "motor") -> FloatArray:

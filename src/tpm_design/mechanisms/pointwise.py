@@ -9,7 +9,7 @@ from numba import njit
 
 from tpm_design.arithmetic import FAST_MATH, inner, kernel
 from tpm_design.mechanisms import equations
-from tpm_design.mechanisms.velocity import jacobian
+from tpm_design.mechanisms.velocity import inverse_condition_frobenius, jacobian
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
@@ -37,6 +37,14 @@ def singularity_row(geometry, mode, x, y, z, determinants):  # type: ignore[no-u
         values = equations.singularity_margins(geometry, mode, x[n], y[n], z[n])
         for k in range(len(values)):
             determinants[k, n] = values[k]
+
+
+@kernel
+def frobenius_row(geometry, mode, motor, x, y, z, out):  # type: ignore[no-untyped-def]
+    """1/κ_F (N,), written in place; NaN where undefined."""
+    for n in range(x.size):
+        rows, b = equations.velocity_map(geometry, mode, motor, x[n], y[n], z[n])
+        out[n] = inverse_condition_frobenius(rows, b)
 
 
 @inner

@@ -524,15 +524,15 @@ def farthest_reach(ranges: Mapping[str, tuple[float, float]]) -> float:
 
 
 def mode_candidates(
-    ranges: Mapping[str, tuple[float, float]], center_free: bool
+    ranges: Mapping[str, tuple[float, float]], isotropic: bool
 ) -> tuple[dict[str, str], ...]:
     """Sign strings of one mode per orbit of the symmetries that every design of the ranges has.
 
-    All 64 unless ``center_free``: a region that stays in its place tells equal modes apart. A caller whose
+    All 64 unless ``isotropic``: a region that stays in its place tells equal modes apart. A caller whose
     region, home pose or joint limits are not the same along the three axes should ask for all as well.
     """
     shared = {IDENTITY}
-    if center_free:
+    if isotropic:
         random = np.random.default_rng(0)
         shared = set.intersection(*(set(_random_symmetries(ranges, random)) for _ in range(3)))
     return tuple(orbit[0] for orbit in mode_orbits(shared))

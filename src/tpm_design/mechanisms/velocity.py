@@ -8,20 +8,20 @@ from __future__ import annotations
 
 import math
 
-from tpm_design.arithmetic import inner
+from tpm_design.arithmetic import inlined, inner
 
 
-@inner
+@inlined
 def _cross(u, v):  # type: ignore[no-untyped-def]
     return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
 
 
-@inner
+@inlined
 def _square(u):  # type: ignore[no-untyped-def]
     return u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
 
 
-@inner
+@inlined
 def adjugate_columns(rows):  # type: ignore[no-untyped-def]
     """Columns of adj(A) for A given by rows, and det A."""
     first = _cross(rows[1], rows[2])
@@ -32,37 +32,43 @@ def adjugate_columns(rows):  # type: ignore[no-untyped-def]
 
 
 @inner
-def scaled_singular_values(columns):  # type: ignore[no-untyped-def]
-    """(greatest, least) singular value of the matrix with these columns.
-
-    Eigenvalues of the Gram matrix in closed form; the least from the determinant, which keeps its
-    relative accuracy when the matrix is nearly singular.
-    """
+def _greatest_singular_value(columns):  # type: ignore[no-untyped-def]
+    """Of the matrix with these columns: greatest eigenvalue of the Gram matrix, in closed form."""
     u, v, w = columns
     g11, g22, g33 = _square(u), _square(v), _square(w)
     g12 = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
     g13 = u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
     g23 = v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
     mean = (g11 + g22 + g33) / 3.0
-    if not mean > 0.0:
-        return 0.0, 0.0
     d1, d2, d3 = g11 - mean, g22 - mean, g33 - mean
     off = g12 * g12 + g13 * g13 + g23 * g23
     spread = math.sqrt((d1 * d1 + d2 * d2 + d3 * d3 + 2.0 * off) / 6.0)
     if spread <= 1e-15 * mean:
-        return math.sqrt(mean), math.sqrt(mean)
+        return math.sqrt(mean)
     shifted = d1 * (d2 * d3 - g23 * g23) - g12 * (g12 * d3 - g23 * g13) + g13 * (g12 * g23 - d2 * g13)
     angle = math.acos(min(1.0, max(-1.0, 0.5 * shifted / spread**3))) / 3.0
-    greatest = mean + 2.0 * spread * math.cos(angle)
-    middle = mean + 2.0 * spread * math.cos(angle - 2.0 * math.pi / 3.0)
-    cross = _cross(v, w)
-    determinant = u[0] * cross[0] + u[1] * cross[1] + u[2] * cross[2]
-    if not middle > 0.0:
-        return math.sqrt(greatest), 0.0
-    return math.sqrt(greatest), abs(determinant) / math.sqrt(greatest * middle)
+    return math.sqrt(mean + 2.0 * spread * math.cos(angle))
 
 
 @inner
+def scaled_singular_values(columns):  # type: ignore[no-untyped-def]
+    """(greatest, least) singular value of the matrix with these columns.
+
+    The cross products of the columns have the products of two singular values as theirs: the least is the
+    determinant over the greatest of these, which keeps its digits when the matrix is nearly singular. The
+    middle eigenvalue in closed form would not.
+    """
+    u, v, w = columns
+    first, second, third = _cross(v, w), _cross(w, u), _cross(u, v)
+    greatest = _greatest_singular_value(columns)
+    pair = _greatest_singular_value((first, second, third))
+    if not pair > 0.0:
+        return greatest, 0.0
+    determinant = u[0] * first[0] + u[1] * first[1] + u[2] * first[2]
+    return greatest, abs(determinant) / pair
+
+
+@inlined
 def _scaled_columns(columns, b):  # type: ignore[no-untyped-def]
     u, v, w = columns
     return (
@@ -80,7 +86,7 @@ def inverse_condition_2(rows, b):  # type: ignore[no-untyped-def]
     return least / greatest if greatest > 0.0 else 0.0
 
 
-@inner
+@inlined
 def inverse_condition_frobenius(rows, b):  # type: ignore[no-untyped-def]
     """1/κ_F = 3/(‖J‖_F ‖J⁻¹‖_F), in [0, 1] (Gosselin & Angeles 1991, weight 1/n)."""
     columns, determinant = adjugate_columns(rows)
@@ -89,9 +95,8 @@ def inverse_condition_frobenius(rows, b):  # type: ignore[no-untyped-def]
     c1, c2, c3 = b[1] * b[2], b[2] * b[0], b[0] * b[1]
     backward = c1 * c1 * _square(rows[0]) + c2 * c2 * _square(rows[1]) + c3 * c3 * _square(rows[2])
     product = forward * backward
-    if not product > 0.0:
-        return 0.0
-    return 3.0 * abs(determinant * b[0] * c1) / math.sqrt(product)
+    value = 3.0 * abs(determinant * b[0] * c1) / math.sqrt(product)
+    return value if product > 0.0 else 0.0
 
 
 @inner

@@ -15,13 +15,9 @@ from tpm_design.workspace.region_geometry import POINTS
 
 SOURCE = "C. Gosselin, J. Angeles, A global performance index for the kinematic optimization, 1991"
 NORM = Option("norm", "choice", "norm of the condition number", default="2", choices=("2", "frobenius"))
-DRIVE = Option(
-    "drive", "choice", "actuators: motors or joints", default="motor", choices=("motor", "joint")
-)
+DRIVE = Option("drive", "choice", "actuators: motors or joints", default="motor", choices=("motor", "joint"))
 OVER = Option("over", "choice", "domain", default="region", choices=("region", "aspect"))
-THRESHOLD = Option(
-    "threshold", "number", "1/κ asked for", minimum=0.0, maximum=1.0, required=True
-)
+THRESHOLD = Option("threshold", "number", "1/κ asked for", minimum=0.0, maximum=1.0, required=True)
 
 
 def _index(context: Context, options: Mapping[str, Any]) -> Index:

@@ -108,7 +108,9 @@ class Context:
 
     @cached_property
     def _survey(self) -> RayField:
-        return mode_field(self.mechanism, self.mode, order=SURVEY_RAYS_PER_SAMPLE * self.region_samples, sided=True)
+        return mode_field(
+            self.mechanism, self.mode, order=SURVEY_RAYS_PER_SAMPLE * self.region_samples, sided=True
+        )
 
     def locus_distance(self, part: int) -> LocusDistance:
         """Distance (m) to the locus of one determinant, for a region reachable throughout.
@@ -162,10 +164,10 @@ class Context:
     @cached_property
     def region_aspects(self) -> tuple[RayField, RayField]:
         """Ray fields of the region's parts in each aspect, fine and coarse."""
-        order = max(3, rays_for(self.volume_rtol) // 2)
+        order = max(3, (rays_for(self.volume_rtol) + 1) // 3)
         return (
             region_field(self.mechanism, self.mode, self.placed, order=order),
-            region_field(self.mechanism, self.mode, self.placed, order=max(2, order - 1)),
+            region_field(self.mechanism, self.mode, self.placed, order=order - 1),
         )
 
     def aspect_of(self, field: RayField, pose: tuple[float, float, float]) -> int | None:

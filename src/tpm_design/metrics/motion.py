@@ -9,9 +9,7 @@ from tpm_design.metrics.base import Measurement, Metric, Option
 from tpm_design.metrics.context import Context
 from tpm_design.workspace.indices import FASTEST, SENSITIVITY, SLOWEST, TRANSMISSION, Index
 
-DRIVE = Option(
-    "drive", "choice", "actuators: motors or joints", default="motor", choices=("motor", "joint")
-)
+DRIVE = Option("drive", "choice", "actuators: motors or joints", default="motor", choices=("motor", "joint"))
 JOINT_DRIVE = Option(
     "drive", "choice", "the index is not defined for motors", default="joint", choices=("joint",)
 )

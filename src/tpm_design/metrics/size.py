@@ -11,9 +11,7 @@ from tpm_design.workspace.extents import field_extent
 from tpm_design.workspace.indices import ACTUATOR, Index
 
 OVER = Option("over", "choice", "poses considered", default="region", choices=("region", "aspect"))
-DRIVE = Option(
-    "drive", "choice", "actuators: motors or joints", default="motor", choices=("motor", "joint")
-)
+DRIVE = Option("drive", "choice", "actuators: motors or joints", default="motor", choices=("motor", "joint"))
 SOURCE = "by definition"
 
 

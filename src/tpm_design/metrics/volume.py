@@ -57,9 +57,7 @@ def _coverage(context: Context, options: Mapping[str, Any]) -> Measurement:
     worst = min(pieces)
     if worst >= 0.0:
         return Measurement(1.0, 0.0, full_slack=worst, pieces=pieces)
-    fine, coarse = (
-        _point_shares(context) if context.placed.form == POINTS else _solid_shares(context)
-    )
+    fine, coarse = _point_shares(context) if context.placed.form == POINTS else _solid_shares(context)
     # what the samples' polish found outside is smaller than the rays resolve
     share = min(fine, 1.0 - RESOLUTION)
     return Measurement(share, max(abs(fine - coarse), RESOLUTION), full_slack=worst, pieces=pieces)

@@ -16,6 +16,15 @@ POLISH_SHARE = 0.25
 """Part of the budget kept for polishing. The whole-space search does not know it: a larger budget lets the
 same path go on."""
 
+POLISH_NEIGHBOURHOODS = (0.05, 0.02, 0.01)
+"""Half widths of the neighbourhoods that are polished, as shares of each range."""
+
+POLISH_ROUND = 40
+"""Evaluations per variable in one neighbourhood."""
+
+POLISH_GAIN = 1e-4
+"""Relative gain below which a design counts as polished."""
+
 
 @dataclass(frozen=True)
 class SearchPlan:
@@ -102,10 +111,14 @@ def _run(method: Optimizer, view: UnitSearch, seed: int) -> tuple[str, str]:
 
 
 def _polish(method: Optimizer, whole: UnitSearch, plan: SearchPlan) -> tuple[str, str]:
-    """Polish the best design, then the best one of every other choice of the discrete variables."""
+    """Polish the best design, then the best one of every other choice of the discrete variables.
+
+    A local method starts in ever smaller neighbourhoods: minima over a region have kinks, at which one that
+    begins with a large step leaves the valley and one that begins with a small step stays in it.
+    """
     log = whole.log
     polished = set()
-    ending, detail = "converged", ""
+    ending, detail = "converged", "The search converged."
     while len(log.entries) < plan.budget:
         choices: dict[tuple[object, ...], Entry] = {}
         for entry in sorted(log.entries, key=log.rank):
@@ -114,11 +127,18 @@ def _polish(method: Optimizer, whole: UnitSearch, plan: SearchPlan) -> tuple[str
         if not left or not whole.space.holding_discrete(left[0][1].evaluation.design).variables:
             break
         key, entry = left[0]
-        polished.add(key)
-        ending, detail = _run(method, whole.continuous_around(entry, plan.budget), plan.seed)
+        before = log.rank(entry)
+        for share in POLISH_NEIGHBOURHOODS:
+            entry = min((e for e in log.entries if _choice(whole.space, e) == key), key=log.rank)
+            limit = min(plan.budget, len(log.entries) + POLISH_ROUND * whole.dimension)
+            if limit > len(log.entries):
+                ending, detail = _run(method, whole.continuous_near(entry, share, limit), plan.seed)
+        after = min(log.rank(e) for e in log.entries if _choice(whole.space, e) == key)
+        if after[0] >= before[0] and after[1] >= before[1] - POLISH_GAIN * abs(before[1]):
+            polished.add(key)
     if len(log.entries) >= plan.budget:
         return "budget spent", "The budget was spent."
-    return ending, detail or "The search converged."
+    return "converged", detail if ending == "converged" else "The search converged."
 
 
 def _choice(space: DesignSpace, entry: Entry) -> tuple[object, ...]:

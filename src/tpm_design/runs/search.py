@@ -21,6 +21,10 @@ PENALTY = 1e3
 """Weight of the violation in the merit of methods without constraints: above the multipliers that
 scaled objectives and constraints have, so that the penalised optimum is the constrained one."""
 
+BACKOFF = 1e-6
+"""Share of its metric's scale by which an optimiser sees each constraint tightened: active-set methods end
+a rounding outside their constraints, and a result must lie inside."""
+
 FAILED = 1e6
 """Objective and shortfall given to an optimiser for a design that could not be measured."""
 
@@ -119,11 +123,12 @@ class UnitSearch:
         results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
         return outcomes(self.log.problem, results, self.sizes)
 
-    def continuous_around(self, entry: Entry, limit: int) -> UnitSearch:
-        """The search of the continuous variables alone, from a design already evaluated."""
+    def continuous_near(self, entry: Entry, share: float, limit: int) -> UnitSearch:
+        """The search of the continuous variables alone, within ``share`` of their ranges around a design
+        already evaluated; its constraints in pieces."""
         evaluation = entry.evaluation
-        space = self.space.holding_discrete(evaluation.design)
-        sizes = tuple(len(evaluation.pieces[goal.label]) for goal in self.log.problem.constraints)
+        space = self.space.holding_discrete(evaluation.design).near(evaluation.design, share)
+        sizes = tuple(len(evaluation.pieces.get(goal.label, (0.0,))) for goal in self.log.problem.constraints)
         return replace(self, space=space, start=space.point(evaluation.design), limit=limit, sizes=sizes)
 
 
@@ -148,7 +153,7 @@ def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[in
     constraints = np.array(
         [
             [
-                piece / goal.metric.scale
+                piece / goal.metric.scale - BACKOFF
                 for goal, size in zip(problem.constraints, sizes, strict=True)
                 for piece in _pieces(goal, result, size)
             ]

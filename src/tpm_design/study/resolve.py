@@ -14,7 +14,15 @@ from tpm_design.study.document import Document, read_document
 from tpm_design.study.faults import Faults, shown
 from tpm_design.study.form import parse
 from tpm_design.study.goals import GoalReader
-from tpm_design.study.model import Center, CenterValue, CertifyModel, OptimizerModel, Range, StudyModel
+from tpm_design.study.model import (
+    BoxModel,
+    Center,
+    CertifyModel,
+    OptimizerModel,
+    Range,
+    SphereModel,
+    StudyModel,
+)
 from tpm_design.study.plain import plain
 from tpm_design.study.quantities import interval
 from tpm_design.study.region import read_region
@@ -51,7 +59,7 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
     faults.raise_if_any()  # the modes and the centre's bounds follow from the parameters
 
     ranges = {name: interval(quantity) for name, quantity in parameters.items()}
-    modes = read_mode(model.mechanism.mode, kind, ranges, _is_free(center), faults)
+    modes = read_mode(model.mechanism.mode, kind, ranges, _isotropic(model), faults)
     quantities = dict(parameters)
     shape = written_region = None
     if region is not None and center is not None:
@@ -120,11 +128,23 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
     )
 
 
-def _is_free(center: CenterValue | None) -> bool:
-    """Whether any part of the region's centre is left to the search."""
-    if isinstance(center, Center):
-        return any(isinstance(axis, Range) for axis in (center.x, center.y, center.z))
-    return center == "free"
+def _isotropic(model: StudyModel) -> bool:
+    """Whether the question stays the same when the axes are permuted or reflected, so that working modes
+    which a symmetry of the mechanism makes equal need not all be searched."""
+    goals = (*model.objectives, *model.constraints, *model.record)
+    if any("home" in goal.options for goal in goals) or any(
+        isinstance(limit, Range) for limit in model.mechanism.limits.values()
+    ):
+        return False
+    region = model.region
+    if region is None:
+        return True
+    center = region.center
+    free = center == "free" or (
+        isinstance(center, Center) and center.mirrored and center.x == center.y == center.z
+    )
+    cube = isinstance(region, BoxModel) and len(set(region.size)) == 1
+    return free and (cube or isinstance(region, SphereModel))
 
 
 def _tolerance(model: CertifyModel, kind: MechanismKind, units: Units, faults: Faults) -> dict[str, float]:

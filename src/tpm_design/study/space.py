@@ -106,23 +106,23 @@ def all_modes(kind: MechanismKind) -> list[dict[str, str]]:
 
 
 def best_modes(
-    kind: MechanismKind, ranges: Mapping[str, tuple[float, float]], center_free: bool
+    kind: MechanismKind, ranges: Mapping[str, tuple[float, float]], isotropic: bool
 ) -> list[dict[str, str]]:
     """The working modes worth trying: one of each kind that symmetry makes equal, if the mechanism knows."""
-    candidates = getattr(kind, "mode_candidates", None)
-    return list(candidates(ranges, center_free)) if candidates else all_modes(kind)
+    candidates = kind.mode_candidates
+    return list(candidates(ranges, isotropic)) if candidates else all_modes(kind)
 
 
 def read_mode(
     given: str | Mapping[str, str] | None,
     kind: MechanismKind,
     ranges: Mapping[str, tuple[float, float]],
-    center_free: bool,
+    isotropic: bool,
     faults: Faults,
 ) -> Modes:
     """The working modes to consider: one, or the candidates of ``best``."""
     if given == "best":
-        return {mode_label(kind, mode): mode for mode in best_modes(kind, ranges, center_free)}
+        return {mode_label(kind, mode): mode for mode in best_modes(kind, ranges, isotropic)}
     fields = {field.name: field for field in kind.mode_fields}
     example = ", ".join(f'{field.name}: "{"+" * field.length}"' for field in kind.mode_fields)
     signs = given if isinstance(given, Mapping) else {}

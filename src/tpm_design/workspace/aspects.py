@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +46,16 @@ def _find(parent, item):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _components(first, start, end, code, neighbours):  # type: ignore[no-untyped-def]
-    """Join segments of neighbouring rays that have one code and overlap; number the sets in order."""
+def _components(rays, start, end, code, neighbours, weights):  # type: ignore[no-untyped-def]
+    """Join segments of neighbouring rays that have one code and overlap; number the sets in order.
+
+    Returns the set of each segment and, per set, Σ weight ∫ t² dt.
+    """
+    first = np.zeros(weights.size + 1, np.int64)
+    for item in range(start.size):
+        first[rays[item] + 1] += 1
+    for ray in range(weights.size):
+        first[ray + 1] += first[ray]
     parent = np.arange(start.size)
     for pair in range(neighbours.shape[0]):
         a, b = neighbours[pair, 0], neighbours[pair, 1]
@@ -54,16 +63,18 @@ def _components(first, start, end, code, neighbours):  # type: ignore[no-untyped
             for j in range(first[b], first[b + 1]):
                 if code[i] == code[j] and max(start[i], start[j]) <= min(end[i], end[j]):
                     parent[_find(parent, i)] = _find(parent, j)
-    number = np.full(start.size, -1, np.int64)
-    component = np.empty(start.size, np.int64)
+    component = np.full(start.size, -1, np.int64)
+    volumes = np.zeros(start.size)
     count = 0
     for item in range(start.size):
         root = _find(parent, item)
-        if number[root] < 0:
-            number[root] = count
+        if component[root] < 0:
+            component[root] = count
             count += 1
-        component[item] = number[root]
-    return component, count
+        number = component[root]
+        component[item] = number
+        volumes[number] += weights[rays[item]] * (end[item] ** 3 - start[item] ** 3) / 3.0
+    return component, volumes[:count]
 
 
 def ray_field(
@@ -89,11 +100,11 @@ def ray_field(
         directions=rays.directions,
         limits=limits,
     )
-    first = np.searchsorted(segments.ray, np.arange(rays.weights.size + 1))
-    component, count = _components(first, segments.start, segments.end, segments.code, rays.neighbours)
-    shares = rays.weights[segments.ray] * (segments.end**3 - segments.start**3) / 3.0
-    cell = float(abs(np.prod(scale)))
-    volumes = cell * np.bincount(component, weights=shares, minlength=count)
+    component, volumes = _components(
+        segments.ray, segments.start, segments.end, segments.code, rays.neighbours, rays.weights
+    )
+    cell = abs(scale[0] * scale[1] * scale[2])
+    volumes *= cell
     whole = cell * float(rays.weights @ limits**3) / 3.0
     return RayField(origin, scale, rays, segments, component, volumes, whole)
 
@@ -101,13 +112,17 @@ def ray_field(
 def mode_field(mechanism: Mechanism, mode: Mode, *, order: int, sided: bool, floor: float = 0.0) -> RayField:
     """The whole workspace of the mode, by ``order``² rays per square from the origin."""
     rays = ray_set(mode_octants(mode), order)
-    limits = mechanism.reach_radius() / np.linalg.norm(rays.directions, axis=1)
+    limits = mechanism.reach_radius() / rays.lengths
     return ray_field(mechanism, mode, rays=rays, limits=limits, sided=sided, floor=floor)
 
 
 def mode_octants(mode: Mode) -> tuple[Octant, ...]:
     """The octants the mode may lie in: its own, or all."""
-    signs = getattr(mode.signs, "octant", (0.0, 0.0, 0.0))
+    return _octants_of(getattr(mode.signs, "octant", (0.0, 0.0, 0.0)))
+
+
+@lru_cache
+def _octants_of(signs: tuple[float, float, float]) -> tuple[Octant, ...]:
     return tuple(o for o in ALL_OCTANTS if all(s in (0.0, float(k)) for s, k in zip(signs, o, strict=True)))
 
 
@@ -120,7 +135,7 @@ def region_field(mechanism: Mechanism, mode: Mode, region: PlacedRegion, *, orde
         across = np.linalg.norm(rays.directions[:, :2], axis=1)
         limits = np.minimum(1.0 / across, 1.0 / np.abs(rays.directions[:, 2]))
     else:
-        limits = 1.0 / np.linalg.norm(rays.directions, axis=1)
+        limits = 1.0 / rays.lengths
     return ray_field(
         mechanism, mode, rays=rays, limits=limits, sided=True, origin=region.centre, scale=region.half
     )

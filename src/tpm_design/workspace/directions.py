@@ -19,9 +19,11 @@ ALL_OCTANTS: tuple[Octant, ...] = tuple((a, b, c) for a, b, c in product((1, -1)
 
 @dataclass(frozen=True)
 class RaySet:
-    """``directions`` (N, 3), ``weights`` (N,) of du dv, ``neighbours`` (M, 2): rays next to each other."""
+    """``directions`` (N, 3), ``lengths`` (N,) their norms, ``weights`` (N,) of du dv, ``neighbours`` (M, 2):
+    rays next to each other."""
 
     directions: NDArray[np.float64]
+    lengths: NDArray[np.float64]
     weights: NDArray[np.float64]
     neighbours: NDArray[np.int64]
 
@@ -40,7 +42,9 @@ def ray_set(octants: tuple[Octant, ...], order: int) -> RaySet:
             square[:, axis], square[:, (axis + 1) % 3], square[:, (axis + 2) % 3] = 1.0, uu, vv
             directions.append(square * np.asarray(octant, dtype=np.float64))
             weights.append(square_weights)
-    return RaySet(np.vstack(directions), np.concatenate(weights), _neighbours(octants, order))
+    stacked = np.vstack(directions)
+    lengths = np.linalg.norm(stacked, axis=1)
+    return RaySet(stacked, lengths, np.concatenate(weights), _neighbours(octants, order))
 
 
 def _neighbours(octants: tuple[Octant, ...], order: int) -> NDArray[np.int64]:

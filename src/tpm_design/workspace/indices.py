@@ -6,10 +6,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms import equations
-from tpm_design.mechanisms.pointwise import least_margin
+from tpm_design.mechanisms.pointwise import columns, frobenius_row, least_margin
 from tpm_design.mechanisms.velocity import (
     inverse_condition_2,
     inverse_condition_frobenius,
@@ -128,9 +129,9 @@ def index_value(geometry, mode, index, x, y, z):  # type: ignore[no-untyped-def]
         value = abs(determinant_at(geometry, mode, index.part, x, y, z))
     elif quantity == SERIAL:
         value = least_margin(equations.serial_margins(geometry, mode, x, y, z))
-    elif quantity == CONDITION_2 or quantity == CONDITION_FROBENIUS:  # noqa: PLR1714
+    elif quantity in (CONDITION_2, CONDITION_FROBENIUS):
         value = condition_at(geometry, mode, quantity == CONDITION_FROBENIUS, index.motor, x, y, z)
-    elif quantity == FASTEST or quantity == SLOWEST:  # noqa: PLR1714
+    elif quantity in (FASTEST, SLOWEST):
         rows, b = _velocity(geometry, mode, index.motor, x, y, z)
         greatest, least = singular_values(rows, b)
         value = greatest if quantity == FASTEST else least
@@ -149,9 +150,20 @@ def index_value(geometry, mode, index, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def index_values(geometry, mode, index, points):  # type: ignore[no-untyped-def]
-    """``index_value`` at poses (N, 3)."""
+def _index_values(geometry, mode, index, points):  # type: ignore[no-untyped-def]
     out = np.empty(points.shape[0])
     for n in range(points.shape[0]):
         out[n] = index_value(geometry, mode, index, points[n, 0], points[n, 1], points[n, 2])
     return out
+
+
+def index_values(
+    geometry: object, signs: object, index: Index, points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """``index_value`` at poses (N, 3)."""
+    if index.quantity != CONDITION_FROBENIUS:
+        return np.asarray(_index_values(geometry, signs, index, points))
+    out = np.empty(len(points))
+    frobenius_row(geometry, signs, index.motor, *columns(points), out)
+    out[np.isnan(out)] = 0.0
+    return index.sign * out

@@ -316,7 +316,9 @@ def locus_distance(
     lattice; ``limit`` (m) at which feelers end.
     """
     inner = _lattice_crossings(determinants[part], grid)
-    ways = _march(geometry, signs, len(determinants), part, feeler_points, feeler_normals, 0.5 * spacing, limit)
+    ways = _march(
+        geometry, signs, len(determinants), part, feeler_points, feeler_normals, 0.5 * spacing, limit
+    )
     outer = np.isfinite(ways)
     starts = np.vstack([inner, feeler_points[outer] + ways[outer, None] * feeler_normals[outer], known])
     return _nearest_locus(geometry, signs, region, part, starts, spacing)

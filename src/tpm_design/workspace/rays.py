@@ -1,8 +1,8 @@
 """Segments of rays that lie in one aspect: brackets on a few samples, ends polished.
 
-A ray is origin + t · scale · direction, t from 0 to its end. Sample parameters crowd at both ends of an
-interval, where determinants have infinite slope (the elbow term goes with the root of the distance to
-the shell). All brackets of a kind are polished together, in vectorised rows.
+A ray is origin + t · scale · direction, t from 0 to its end. It is cut twice: where reach begins and ends,
+then where a determinant changes sides. Between the samples of all rays, all changes are polished together,
+so that margins are computed in vectorised rows.
 """
 
 from __future__ import annotations
@@ -16,10 +16,13 @@ from numpy.typing import NDArray
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms.pointwise import reach_row, singularity_row
 
-REACH_SAMPLES = 24
-SIDE_SAMPLES = 20
+REACH_SAMPLES = np.linspace(0.0, 1.0, 24)
+REACH_SAMPLES[0] = 1e-12
+# crowded at both ends, where determinants have infinite slope (the elbow term goes with the root of the
+# distance to the shell)
+SIDE_SAMPLES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 20))
+SIDE_SAMPLES[0], SIDE_SAMPLES[-1] = 1e-9, 1.0 - 1e-9
 MOST_STEPS = 80
-REACH = -1
 
 
 @dataclass(frozen=True)
@@ -40,21 +43,15 @@ def _place(origin, steps, ray, t, poses, n):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _workspace_margins(geometry, mode, poses, count):  # type: ignore[no-untyped-def]
-    """Metres (N,) of the first ``count`` poses, ≥ 0 where reachable in the mode."""
-    legs, side = np.empty(count), np.empty(count)
-    reach_row(geometry, mode, poses[0, :count], poses[1, :count], poses[2, :count], legs, side)
-    for n in range(count):
-        legs[n] = min(legs[n], side[n])
-    return legs
-
-
-@inner
-def _determinants(geometry, mode, determinant_count, poses, count):  # type: ignore[no-untyped-def]
-    """Signed determinants (D, N) of the first ``count`` poses."""
-    determinants = np.empty((determinant_count, count))
-    singularity_row(geometry, mode, poses[0, :count], poses[1, :count], poses[2, :count], determinants)
-    return determinants
+def _margins(geometry, mode, sided, poses, count, out):  # type: ignore[no-untyped-def]
+    """Margins (P, N) of the first ``count`` poses, in place: determinants, or in the first row the reach."""
+    x, y, z = poses[0, :count], poses[1, :count], poses[2, :count]
+    if sided:
+        singularity_row(geometry, mode, x, y, z, out)
+    else:
+        reach_row(geometry, mode, x, y, z, out[0], out[1])
+        for n in range(count):
+            out[0, n] = min(out[0, n], out[1, n])
 
 
 @inner
@@ -73,120 +70,57 @@ def _next_share(a, fa, b, fb, c, fc, tolerance):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _roots(geometry, mode, determinant_count, origin, steps, changes, brackets):  # type: ignore[no-untyped-def]
-    """Ray parameters (N,) where margins change sign, on the side where they are ≥ 0.
+def _roots(geometry, mode, sided, origin, steps, changes, brackets, size, part_count):  # type: ignore[no-untyped-def]
+    """Ray parameters where margins change sign, on the side where they are ≥ 0.
 
-    ``changes`` (N, 3+): ray and whose margin, a determinant's number or REACH in every row. ``brackets``
-    (N, 5): two ray parameters, the margins there, the level that a determinant passes.
+    Of the first ``size`` ``changes`` (N, 2+): ray and part, and ``brackets`` (N, 5): two ray parameters, the
+    part's margins there less the level that is passed, the level.
     """
-    size = changes.shape[0]
-    a, b, fa, fb = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    margins = np.empty((part_count + 1, size))
+    t, poses, unfinished = np.empty(size), np.empty((3, size)), np.arange(size)
     for i in range(size):
-        a[i], b[i], fa[i], fb[i] = brackets[i, 0], brackets[i, 1], brackets[i, 2], brackets[i, 3]
-    t = 0.5 * (a + b)
-    poses = np.empty((3, size))
-    unfinished = np.arange(size)
+        a, b, fa, fb = brackets[i, 0], brackets[i, 1], brackets[i, 2], brackets[i, 3]
+        share = fa / (fa - fb)
+        t[i] = a + (share if 0.05 < share < 0.95 else 0.5) * (b - a)
     count = size
     for _ in range(MOST_STEPS):
-        if count == 0:
-            break
         for n in range(count):
             _place(origin, steps, changes[unfinished[n], 0], t[unfinished[n]], poses, n)
-        if changes[0, 1] == REACH:
-            margins = _workspace_margins(geometry, mode, poses, count)
-        else:
-            determinants = _determinants(geometry, mode, determinant_count, poses, count)
-            margins = np.empty(count)
-            for n in range(count):
-                i = unfinished[n]
-                margins[n] = determinants[changes[i, 1], n] - brackets[i, 4]
+        _margins(geometry, mode, sided, poses, count, margins)
         kept = 0
         for n in range(count):
             i = unfinished[n]
-            c, fc = a[i], fa[i]
-            if (margins[n] >= 0.0) != (fa[i] >= 0.0):
-                c, fc = b[i], fb[i]
-                b[i], fb[i] = a[i], fa[i]
-            a[i], fa[i] = t[i], margins[n]
-            tolerance = 1e-12 * max(abs(a[i]), abs(b[i]))
-            if fa[i] != 0.0 and abs(b[i] - a[i]) > tolerance:
-                share = _next_share(a[i], fa[i], b[i], fb[i], c, fc, tolerance)
-                t[i] = a[i] + share * (b[i] - a[i])
+            a, b, fa, fb = brackets[i, 0], brackets[i, 1], brackets[i, 2], brackets[i, 3]
+            value = margins[changes[i, 1], n] - brackets[i, 4]
+            c, fc = a, fa
+            if (value >= 0.0) != (fa >= 0.0):
+                c, fc, b, fb = b, fb, a, fa
+            a, fa = t[i], value
+            brackets[i, 0], brackets[i, 1], brackets[i, 2], brackets[i, 3] = a, b, fa, fb
+            tolerance = 1e-12 * max(abs(a), abs(b))
+            if fa != 0.0 and abs(b - a) > tolerance:
+                t[i] = a + _next_share(a, fa, b, fb, c, fc, tolerance) * (b - a)
                 unfinished[kept] = i
                 kept += 1
+            else:
+                t[i] = a if fa >= 0.0 else b
         count = kept
-    for i in range(size):
-        if not fa[i] >= 0.0:
-            a[i] = b[i]
-    return a
+        if count == 0:
+            break
+    return t
 
 
 @inner
-def _append(out, count, ray, start, end, code):  # type: ignore[no-untyped-def]
-    """Add a segment unless it is empty."""
-    if end > start:
-        rays, starts, ends, codes = out
-        n = count[0]
-        rays[n], starts[n], ends[n], codes[n] = ray, start, end, code
-        count[0] = n + 1
-
-
-@inner
-def _empty_segments(size):  # type: ignore[no-untyped-def]
-    return np.empty(size, np.int64), np.empty(size), np.empty(size), np.empty(size, np.int64)
-
-
-@inner
-def _reachable_segments(geometry, mode, determinant_count, origin, steps, limits):  # type: ignore[no-untyped-def]
-    """Segments of code 1 and their number."""
-    size = limits.size * REACH_SAMPLES
-    parameters, poses = np.empty(size), np.empty((3, size))
-    for ray in range(limits.size):
-        for k in range(REACH_SAMPLES):
-            n = ray * REACH_SAMPLES + k
-            parameters[n] = limits[ray] * max(1e-12, k / (REACH_SAMPLES - 1))
-            _place(origin, steps, ray, parameters[n], poses, n)
-    margins = _workspace_margins(geometry, mode, poses, size)
-    changes, brackets = np.empty((size, 2), np.int64), np.empty((size, 5))
-    found = 0
-    for n in range(1, size):
-        if n % REACH_SAMPLES > 0 and (margins[n] >= 0.0) != (margins[n - 1] >= 0.0):
-            changes[found, 0], changes[found, 1] = n // REACH_SAMPLES, REACH
-            brackets[found, 0], brackets[found, 1] = parameters[n - 1], parameters[n]
-            brackets[found, 2], brackets[found, 3] = margins[n - 1], margins[n]
-            found += 1
-    ends = _roots(
-        geometry, mode, determinant_count, origin, steps, changes[:found], brackets[:found]
-    )
-    out = _empty_segments(limits.size + found)
-    count = np.zeros(1, np.int64)
-    code = 1
-    change = 0
-    for ray in range(limits.size):
-        inside = margins[ray * REACH_SAMPLES] >= 0.0
-        opened = 0.0
-        while change < found and changes[change, 0] == ray:
-            if inside:
-                _append(out, count, ray, opened, ends[change], code)
-            inside = not inside
-            opened = ends[change]
-            change += 1
-        if inside:
-            _append(out, count, ray, opened, limits[ray], code)
-    return out, count[0]
-
-
-@inner
-def _state(determinant, floor):  # type: ignore[no-untyped-def]
-    """+1 or −1 on a side of the singularity, 0 within ``floor`` of it or where undefined."""
-    if determinant > floor:
+def _state(margin, floor):  # type: ignore[no-untyped-def]
+    """+1 or −1 on a side of the locus, 0 within ``floor`` of it or where undefined."""
+    if margin > floor:
         return 1
-    return -1 if determinant < -floor else 0
+    return -1 if margin < -floor else 0
 
 
 @inner
 def _code(states):  # type: ignore[no-untyped-def]
-    """As ``side_code``."""
+    """0 where a state is 0, else 1 + one bit per positive state."""
     code = 1
     for k in range(states.size):
         if states[k] == 0:
@@ -197,8 +131,45 @@ def _code(states):  # type: ignore[no-untyped-def]
 
 
 @inner
+def _most_changes(margins, part_count, size, floor):  # type: ignore[no-untyped-def]
+    """At least as many as ``_find_changes`` finds."""
+    most = 0
+    for part in range(part_count):
+        for n in range(1, size):
+            if _state(margins[part, n - 1], floor) != _state(margins[part, n], floor):
+                most += 2
+    return most
+
+
+@inner
+def _find_changes(margins, part_count, parameters, rays, samples, floor, changes, brackets, first):  # type: ignore[no-untyped-def]
+    """Find all changes of state between samples.
+
+    ``changes`` (N, 3): ray, part, state afterwards. ``brackets`` as in ``_roots``. ``first`` (S + 1,): a
+    segment's first change, and where the last one's end.
+    """
+    count = 0
+    for s in range(rays.size):
+        first[s] = count
+        for n in range(s * samples + 1, (s + 1) * samples):
+            for part in range(part_count):
+                before, here = margins[part, n - 1], margins[part, n]
+                state, after = _state(before, floor), _state(here, floor)
+                while state != after:
+                    level = floor * (state if state != 0 else after)
+                    # without a floor the two sides touch
+                    state = after if floor == 0.0 or state == 0 else 0
+                    changes[count, 0], changes[count, 1], changes[count, 2] = rays[s], part, state
+                    brackets[count, 0], brackets[count, 1] = parameters[n - 1], parameters[n]
+                    brackets[count, 2], brackets[count, 3] = before - level, here - level
+                    brackets[count, 4] = level
+                    count += 1
+    first[rays.size] = count
+
+
+@inner
 def _sort(keys, rows, first, last):  # type: ignore[no-untyped-def]
-    """Sort keys and rows from ``first`` to before ``last``; few and nearly in order."""
+    """Sort keys and their rows from ``first`` to before ``last``; few and nearly in order."""
     for end in range(first + 1, last):
         n = end
         while n > first and keys[n - 1] > keys[n]:
@@ -208,83 +179,53 @@ def _sort(keys, rows, first, last):  # type: ignore[no-untyped-def]
             n -= 1
 
 
-@inner
-def _sided_segments(geometry, mode, determinant_count, floor, origin, steps, found, count):  # type: ignore[no-untyped-def]
-    """The first ``count`` reachable segments cut where the side of a singularity changes, their number."""
-    rays, starts, ends, _ = found
-    shape = np.empty(SIDE_SAMPLES)
-    for k in range(SIDE_SAMPLES):
-        shape[k] = 0.5 * (1.0 - math.cos(math.pi * k / (SIDE_SAMPLES - 1)))
-    shape[0], shape[-1] = 1e-9, 1.0 - 1e-9
-    size = count * SIDE_SAMPLES
+@kernel
+def _cut(geometry, mode, sided, part_count, floor, origin, steps, segments, shape, lowest):  # type: ignore[no-untyped-def]
+    """Segments (ray, start, end) cut where a margin changes sides: the same and the code of what has at
+    least the ``lowest`` code."""
+    rays, starts, ends = segments
+    samples = shape.size
+    size = rays.size * samples
     parameters, poses = np.empty(size), np.empty((3, size))
-    for s in range(count):
-        for k in range(SIDE_SAMPLES):
-            n = s * SIDE_SAMPLES + k
+    for s in range(rays.size):
+        for k in range(samples):
+            n = s * samples + k
             parameters[n] = starts[s] + (ends[s] - starts[s]) * shape[k]
             _place(origin, steps, rays[s], parameters[n], poses, n)
-    determinants = _determinants(geometry, mode, determinant_count, poses, size)
-    # ray, determinant, segment, state after the change
-    changes, brackets = np.empty((2 * determinant_count * size, 4), np.int64), np.empty((2 * determinant_count * size, 5))
-    total = 0
-    for n in range(1, size):
-        for part in range(determinant_count):
-            if n % SIDE_SAMPLES == 0:
-                continue
-            before, here = determinants[part, n - 1], determinants[part, n]
-            state, after = _state(before, floor), _state(here, floor)
-            while state != after:
-                level = floor * (state if state != 0 else after)
-                # without a floor the two sides touch
-                state = after if floor == 0.0 or state == 0 else 0
-                changes[total, 0], changes[total, 1] = rays[n // SIDE_SAMPLES], part
-                changes[total, 2], changes[total, 3] = n // SIDE_SAMPLES, state
-                brackets[total, 0], brackets[total, 1] = parameters[n - 1], parameters[n]
-                brackets[total, 2], brackets[total, 3] = before - level, here - level
-                brackets[total, 4] = level
-                total += 1
-    roots = _roots(
-        geometry, mode, determinant_count, origin, steps, changes[:total], brackets[:total]
-    )
-    out = _empty_segments(count + total)
-    number = np.zeros(1, np.int64)
-    states = np.empty(determinant_count, np.int64)
-    change = 0
-    for s in range(count):
-        last = change
-        while last < total and changes[last, 2] == s:
-            last += 1
-        _sort(roots, changes, change, last)
-        for part in range(determinant_count):
-            states[part] = _state(determinants[part, s * SIDE_SAMPLES], floor)
+    # reach_row needs a second row
+    margins = np.empty((part_count + 1, size))
+    _margins(geometry, mode, sided, poses, size, margins)
+    most = _most_changes(margins, part_count, size, floor)
+    changes, brackets = np.empty((most, 3), np.int64), np.empty((most, 5))
+    first = np.empty(rays.size + 1, np.int64)
+    _find_changes(margins, part_count, parameters, rays, samples, floor, changes, brackets, first)
+    total = first[rays.size]
+    roots = _roots(geometry, mode, sided, origin, steps, changes, brackets, total, part_count)
+    most = rays.size + total
+    ray, codes = np.empty(most, np.int64), np.empty(most, np.int64)
+    start, end = np.empty(most), np.empty(most)
+    states = np.empty(part_count, np.int64)
+    found = 0
+    for s in range(rays.size):
+        _sort(roots, changes, first[s], first[s + 1])
+        for part in range(part_count):
+            states[part] = _state(margins[part, s * samples], floor)
         code = _code(states)
         opened = starts[s]
-        for n in range(change, last):
-            states[changes[n, 1]] = changes[n, 3]
-            following = _code(states)
-            if following != code:
-                if code > 0:
-                    _append(out, number, rays[s], opened, roots[n], code)
-                opened = roots[n]
+        for n in range(first[s], first[s + 1] + 1):
+            last = n == first[s + 1]
+            closed = ends[s] if last else roots[n]
+            following = code
+            if not last:
+                states[changes[n, 1]] = changes[n, 2]
+                following = _code(states)
+            if last or following != code:
+                if code >= lowest and closed > opened:
+                    ray[found], start[found], end[found], codes[found] = rays[s], opened, closed, code
+                    found += 1
+                opened = closed
                 code = following
-        if code > 0:
-            _append(out, number, rays[s], opened, ends[s], code)
-        change = last
-    return out, number[0]
-
-
-@kernel
-def _trace(geometry, mode, sided, floor, origin, scale, directions, limits, determinant_count):  # type: ignore[no-untyped-def]
-    steps = np.empty_like(directions)
-    for ray in range(directions.shape[0]):
-        for k in range(3):
-            steps[ray, k] = scale[k] * directions[ray, k]
-    out, count = _reachable_segments(geometry, mode, determinant_count, origin, steps, limits)
-    if sided:
-        out, count = _sided_segments(
-            geometry, mode, determinant_count, floor, origin, steps, out, count
-        )
-    return out[0][:count], out[1][:count], out[2][:count], out[3][:count]
+    return ray[:found], start[:found], end[:found], codes[:found]
 
 
 def trace(
@@ -304,6 +245,12 @@ def trace(
     ``sided``: cut where a determinant changes side or falls to ``floor``; otherwise reach alone.
     ``limits`` (N,): ray parameters at which the rays end.
     """
-    return Segments(
-        *_trace(geometry, signs, sided, floor, origin, scale, directions, limits, determinant_count)
-    )
+    steps = directions * np.asarray(scale)
+    whole = np.arange(limits.size), np.zeros(limits.size), limits
+    # code 2 is within reach, code 1 outside
+    ray, start, end, code = _cut(geometry, signs, False, 1, 0.0, origin, steps, whole, REACH_SAMPLES, 2)
+    if not sided:
+        return Segments(ray, start, end, np.ones_like(code))
+    reach = ray, start, end
+    cuts = _cut(geometry, signs, True, determinant_count, floor, origin, steps, reach, SIDE_SAMPLES, 1)
+    return Segments(*cuts)

@@ -1,0 +1,107 @@
+"""Figure: the best design so far against the number of the evaluation."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from tpm_design.report.history import History, history
+from tpm_design.report.reported import Reported
+from tpm_design.report.style import BLUE, GREEN, GREY, SMALL, TEXT, VERMILLION, new_figure, plain, tidy, title
+from tpm_design.runs.tables import goal_unit
+
+VIEWED = (2.0, 98.0)
+"""Percentiles of the feasible evaluations that are sure to be in view, beside the best so far."""
+
+
+def convergence_figure(reported: Reported) -> Figure | None:
+    """None where nothing was evaluated."""
+    course = history(reported.problem, reported.run.entries)
+    missed = course.violation[course.violation > 0.0]
+    has_objective = bool(course.feasible.any())
+    if not has_objective and not missed.size:
+        return None
+    figure = new_figure(7.5, 5.2 if has_objective and missed.size else 4.0, "constrained")
+    if has_objective and missed.size:
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1.2))
+        _draw_objective(upper, course, reported)
+        _draw_violation(lower, course)
+        last = lower
+    elif has_objective:
+        last = figure.subplots()
+        _draw_objective(last, course, reported)
+    else:
+        last = figure.subplots()
+        _draw_violation(last, course)
+    last.set_xlabel("evaluation", fontsize=TEXT)
+    last.xaxis.set_major_locator(MaxNLocator(integer=True))
+    title(figure, convergence_finding(reported))
+    return figure
+
+
+def convergence_finding(reported: Reported) -> str:
+    """How far the search came."""
+    course = history(reported.problem, reported.run.entries)
+    count = len(course.numbers)
+    first = course.first_feasible
+    if first is None:
+        return f"No feasible design in {count} evaluations: least violation {np.nanmin(course.violation):.3g}"
+    goal, units = reported.problem.objectives[0], reported.study.units
+    unit = goal_unit(reported.problem, goal)
+    reached = course.best[np.isfinite(course.best)]
+    if reached[0] == reached[-1]:
+        return (
+            f"{goal.label}: {units.written(reached[-1], unit, 4)} at evaluation {first}, "
+            f"not bettered in {count} evaluations"
+        )
+    found = int(course.numbers[np.argmax(course.best == reached[-1])])
+    return (
+        f"{goal.label} went from {units.written(reached[0], unit, 4)} (first feasible design, evaluation "
+        f"{first}) to {units.written(reached[-1], unit, 4)} (evaluation {found} of {count})"
+    )
+
+
+def _draw_objective(axes: Axes, course: History, reported: Reported) -> None:
+    goal, units = reported.problem.objectives[0], reported.study.units
+    unit = goal_unit(reported.problem, goal)
+    factor = units.from_si(1.0, unit)
+    values, best = course.objective * factor, course.best * factor
+    missed = ~course.feasible
+    axes.scatter(
+        course.numbers[missed], values[missed], s=9, color=GREY, alpha=0.5, linewidths=0, label="infeasible"
+    )
+    axes.scatter(
+        course.numbers[~missed], values[~missed], s=12, color=BLUE, alpha=0.55, linewidths=0, label="feasible"
+    )
+    axes.step(course.numbers, best, where="post", color=BLUE, linewidth=2.0, label="best feasible so far")
+    shown = np.concatenate([best[np.isfinite(best)], np.nanpercentile(values[~missed], VIEWED)])
+    room = 0.06 * (np.ptp(shown) or abs(float(shown[0])) or 1.0)
+    axes.set_ylim(float(shown.min()) - room, float(shown.max()) + room)
+    _mark_first_feasible(axes, course)
+    axes.set_ylabel(plain(f"{goal.label} [{units.name(unit)}]"), fontsize=TEXT)
+    axes.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, fontsize=SMALL, markerscale=1.8
+    )
+    tidy(axes)
+
+
+def _draw_violation(axes: Axes, course: History) -> None:
+    positive = course.violation > 0.0
+    axes.scatter(
+        course.numbers[positive], course.violation[positive], s=9, color=GREY, alpha=0.5, linewidths=0
+    )
+    closest = np.where(course.closest > 0.0, course.closest, np.nan)
+    axes.step(course.numbers, closest, where="post", color=VERMILLION, linewidth=2.0)
+    axes.set_yscale("log")
+    axes.set_ylabel("violation [–]\nline: least so far", fontsize=SMALL)
+    _mark_first_feasible(axes, course)
+    tidy(axes)
+
+
+def _mark_first_feasible(axes: Axes, course: History) -> None:
+    if course.first_feasible is not None and not course.feasible[0]:
+        axes.axvline(
+            course.first_feasible, color=GREEN, linewidth=1.2, linestyle=(0, (4, 3)), label="first feasible"
+        )

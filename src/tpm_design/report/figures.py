@@ -1,0 +1,91 @@
+"""The figures of a report, each with the sentence that goes below it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from tpm_design.report.convergence import convergence_figure, convergence_finding
+from tpm_design.report.maps import conditioning_figure, workspace_figure
+from tpm_design.report.reported import Reported, best_context
+from tpm_design.report.rooms import rooms_figure, rooms_finding
+from tpm_design.report.style import save
+from tpm_design.report.survey import conditioning_shown, has_conditioning, survey
+
+FIGURES = "figures"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One figure: its file, what it shows in one sentence, and how to read it in another."""
+
+    file: str
+    finding: str
+    caption: str
+    figure: Figure
+
+
+def pictures(reported: Reported) -> tuple[Picture, ...]:
+    """What there is to draw of a run, in the order of the report."""
+    rooms, course = rooms_figure(reported), convergence_figure(reported)
+    found = _slice_pictures(reported)
+    if rooms is not None:
+        found.append(
+            Picture(
+                "constraints.png",
+                rooms_finding(reported),
+                "Distance of every constraint to its bound after the numeric error is taken off, as a share "
+                "of the bound (of the metric's scale where the bound is 0); bars are cut at 100 %.",
+                rooms,
+            )
+        )
+    if course is not None:
+        found.append(
+            Picture(
+                "convergence.png",
+                convergence_finding(reported),
+                "The best feasible objective and the least violation so far; a dot is one evaluated design.",
+                course,
+            )
+        )
+    return tuple(found)
+
+
+def _slice_pictures(reported: Reported) -> list[Picture]:
+    context = best_context(reported)
+    view = None if context is None else survey(context, reported.problem)
+    if view is None:
+        return []
+    units = reported.study.units
+    middle = "useful region" if view.context.region is not None else "singularity-free side"
+    found = [
+        Picture(
+            "workspace.png",
+            view.headline(units),
+            f"Three planes through the middle of the {middle}: what the working mode reaches, the "
+            "singularity-free side the design works on, and the curves where a determinant vanishes.",
+            workspace_figure(view, units),
+        )
+    ]
+    if has_conditioning(reported.problem):
+        shown = conditioning_shown(reported.problem)
+        found.append(
+            Picture(
+                "conditioning.png",
+                view.conditioning_headline(shown),
+                f"{shown.name} on the same planes: 1 is isotropic, 0 is singular.",
+                conditioning_figure(view, shown, units),
+            )
+        )
+    return found
+
+
+def write_pictures(folder: Path, found: tuple[Picture, ...]) -> tuple[Path, ...]:
+    """Save the figures below ``folder``."""
+    target = folder / FIGURES
+    target.mkdir(exist_ok=True)
+    for picture in found:
+        save(picture.figure, target / picture.file)
+    return tuple(target / picture.file for picture in found)

@@ -1,0 +1,58 @@
+"""What a report is about: a run read back, its study, and the design it ended with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tpm_design.errors import ParameterError
+from tpm_design.metrics.context import Context
+from tpm_design.problem import Problem, design_context
+from tpm_design.runs.folder import STUDY, StoredRun, read_run
+from tpm_design.runs.search import Entry, EvaluationLog
+from tpm_design.study import Study, load_study
+
+
+@dataclass(frozen=True)
+class Reported:
+    """A run and the study it answers. ``best``: the best feasible entry, else the one of least violation;
+    None where nothing was evaluated."""
+
+    study: Study
+    run: StoredRun
+    best: Entry | None
+
+    @property
+    def problem(self) -> Problem:
+        return self.study.problem
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run came to its end and wrote its summary."""
+        return bool(self.run.summary)
+
+    @property
+    def feasible(self) -> bool:
+        return self.best is not None and self.best.evaluation.status == "feasible"
+
+
+def read_reported(folder: Path) -> Reported:
+    """The run in ``folder``, finished or cut short. Raises UsageError or StudyError."""
+    run = read_run(folder)
+    study = load_study(folder / STUDY)
+    return Reported(study, run, run.best or best_of(study.problem, run.entries))
+
+
+def best_of(problem: Problem, entries: tuple[Entry, ...]) -> Entry | None:
+    """The entry a search of these entries would have ended with."""
+    return min(entries, key=EvaluationLog(problem, workers=1).rank, default=None)
+
+
+def best_context(reported: Reported) -> Context | None:
+    """The mechanism, mode and region of the best design; None where there is none that can be built."""
+    if reported.best is None:
+        return None
+    try:
+        return design_context(reported.problem, reported.best.evaluation.design)
+    except ParameterError:
+        return None

@@ -1,0 +1,84 @@
+"""What a study asks, in words with its own units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tpm_design.problem import Goal, Problem, Variable
+from tpm_design.units import Units, si_unit
+from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere
+
+
+def asked(goal: Goal, units: Units, unit: str) -> str:
+    """``≥ 20 mm``, ``minimise``, ``recorded``."""
+    if goal.sense is not None:
+        return "minimise" if goal.sense == "minimize" else "maximise"
+    bounds = []
+    if goal.minimum is not None:
+        bounds.append(f"≥ {units.written(goal.minimum, unit)}")
+    if goal.maximum is not None:
+        bounds.append(f"≤ {units.written(goal.maximum, unit)}")
+    return " and ".join(bounds) or "recorded"
+
+
+def options_text(goal: Goal, units: Units) -> str:
+    """The metric's options in force: ``norm 2, drive motor``; empty where it has none."""
+    parts = []
+    for option in goal.metric.options:
+        value = goal.options.get(option.name, option.default)
+        if value is None:
+            continue
+        if option.kind == "point":
+            parts.append(f"{option.name} {lengths_text(value, units)}")
+        elif option.kind == "number":
+            parts.append(f"{option.name} {value:g}")
+        else:
+            parts.append(f"{option.name} {value}")
+    return ", ".join(parts)
+
+
+def lengths_text(values: Sequence[float], units: Units) -> str:
+    """Lengths (m) of a point or of half axes: ``(200, 100, 50) mm``."""
+    numbers = ", ".join(f"{units.from_si(value, 'm'):.6g}" for value in values)
+    return f"({numbers}) {units.name('m')}"
+
+
+def shape_text(shape: Shape, units: Units) -> str:
+    """The useful region."""
+    if isinstance(shape, Box):
+        edges = " × ".join(f"{units.from_si(edge, 'm'):.6g}" for edge in shape.size)
+        return f"a box of {edges} {units.name('m')}"
+    if isinstance(shape, Cylinder):
+        radius, height = units.written(shape.radius, "m"), units.written(shape.height, "m")
+        return f"a cylinder along z of radius {radius} and height {height}"
+    if isinstance(shape, Sphere):
+        return f"a ball of radius {units.written(shape.radius, 'm')}"
+    if isinstance(shape, Ellipsoid):
+        return f"an ellipsoid of half axes {lengths_text(shape.semi_axes, units)}"
+    assert isinstance(shape, Points)
+    return f"{len(shape.points)} single poses"
+
+
+def centre_text(problem: Problem, units: Units) -> str:
+    """Where the region's centre is."""
+    free = [v.name for v in problem.variables if v.name.startswith("center_")]
+    if not free:
+        centre = [float(problem.fixed[f"center_{axis}"]) for axis in "xyz"]
+        return f"its centre at {lengths_text(centre, units)}"
+    axes = ", ".join(name.removeprefix("center_") for name in free)
+    return "its centre free" if len(free) == 3 else f"its centre free along {axes}"
+
+
+def range_text(variable: Variable | None, units: Units) -> str:
+    """Where a quantity was searched."""
+    if variable is None:
+        return "fixed"
+    unit = si_unit(variable.dimension)
+    if variable.values:
+        return "one of " + ", ".join(
+            value if isinstance(value, str) else f"{units.from_si(value, unit):.6g}"
+            for value in variable.values
+        )
+    low, high = units.from_si(variable.lower, unit), units.from_si(variable.upper, unit)
+    side = ", on the octant's side" if variable.mirrored else ""
+    return f"{low:.6g} … {high:.6g}{side}"

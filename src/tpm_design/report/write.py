@@ -1,0 +1,34 @@
+"""Write the report of a run into its folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tpm_design.errors import UsageError
+from tpm_design.report.figures import pictures, write_pictures
+from tpm_design.report.markdown import report_markdown
+from tpm_design.report.reported import read_reported
+
+REPORT = "report.md"
+
+
+def write_report(folder: Path) -> tuple[Path, ...]:
+    """Write ``report.md`` and ``figures/*.png`` of the run in ``folder``, finished or cut short, and return
+    their paths, the report first.
+
+    Raises UsageError where ``folder`` is no run, its log is damaged or it cannot be written to, and
+    StudyError where its study cannot be used.
+    """
+    reported = read_reported(folder)
+    found = pictures(reported)
+    try:
+        images = write_pictures(folder, found)
+        report = folder / REPORT
+        report.write_text(report_markdown(reported, found), encoding="utf-8")
+    except OSError as error:
+        raise UsageError(
+            f"The report cannot be written: {error.strerror}.",
+            where=str(folder),
+            remedy="Check that the folder can be written to and that the disk is not full.",
+        ) from None
+    return report, *images
