@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tpm_design.cli.guard import guarded
+from tpm_design.cli.guard import guarded, run_to_the_end
 
 app = typer.Typer(
     name="tpm-design",
@@ -160,4 +160,4 @@ def report(
 
 def main() -> None:
     """Entry point of `tpm-design`."""
-    app()
+    run_to_the_end(app)

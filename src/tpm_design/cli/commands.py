@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import sys
 
 from collections.abc import Sequence
 
@@ -25,6 +26,7 @@ from tpm_design.study.actions import optimize_study, plan_of, pose_values
 from tpm_design.units import unit_for
 
 RESULTS = Path("results")
+SWITCH_INTERVAL = 1e-4
 
 
 def init_study(name: str, mechanism: str) -> int | None:
@@ -205,6 +207,8 @@ def optimize_one(
         )
     study = load_study(path).searched_with(seed=seed, budget=budget)
     check_plan(study.problem, plan_of(study))
+    # short compiled calls by several threads: the usual 5 ms would make them wait for one another
+    sys.setswitchinterval(SWITCH_INTERVAL)
     with search_progress(study.problem, study.units, study.optimizer.budget, quiet=quiet or as_json) as watch:
         run = optimize_study(study, workers=workers or usable_processors(), output=output, watch=watch)
     feasible = run.best is not None and run.best.status == "feasible"

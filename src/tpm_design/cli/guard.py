@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 import sys
 import tempfile
 import traceback
@@ -33,15 +34,47 @@ def guarded(command: Callable[Arguments, int | None]) -> Callable[Arguments, Non
             complain("Interrupted.")
             code = INTERRUPTED
         except BrokenPipeError:
-            # the reader of a pipe has seen enough; nothing more can be printed
-            sys.stdout = None  # type: ignore[assignment]
+            _drop_output()
             code = 0
+        except OSError as error:
+            complain(_trouble(error))
+            code = USAGE
         except Exception as error:
             complain(_bug_message(error))
             code = INTERNAL
         raise typer.Exit(code)
 
     return run
+
+
+def run_to_the_end(app: Callable[[], None]) -> None:
+    """Run the program and write out what it printed, so that a failure to do so has one message too."""
+    code: int | str | None = 0
+    try:
+        try:
+            app()
+        except SystemExit as end:
+            code = end.code
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # the reader of the pipe has seen enough
+        _drop_output()
+    except OSError as error:
+        _drop_output()
+        complain(_trouble(error))
+        code = USAGE
+    sys.exit(code)
+
+
+def _drop_output() -> None:
+    """Nothing more can be printed: what is left in the buffer goes nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _trouble(error: OSError) -> str:
+    what = error.filename or "The output cannot be written"
+    return f"{what}: {error.strerror or error}."
 
 
 def complain(message: str) -> None:

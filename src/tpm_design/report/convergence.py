@@ -68,15 +68,15 @@ def _draw_objective(axes: Axes, course: History, reported: Reported) -> None:
     unit = goal_unit(reported.problem, goal)
     factor = units.from_si(1.0, unit)
     values, best = course.objective * factor, course.best * factor
-    missed = ~course.feasible
-    axes.scatter(
-        course.numbers[missed], values[missed], s=9, color=GREY, alpha=0.5, linewidths=0, label="infeasible"
-    )
-    axes.scatter(
-        course.numbers[~missed], values[~missed], s=12, color=BLUE, alpha=0.55, linewidths=0, label="feasible"
-    )
+    for chosen, colour, size, name in (
+        (~course.feasible & np.isfinite(values), GREY, 9, "infeasible"),
+        (course.feasible, BLUE, 12, "feasible"),
+    ):
+        if chosen.any():
+            across, up = course.numbers[chosen], values[chosen]
+            axes.scatter(across, up, s=size, color=colour, alpha=0.5, linewidths=0, label=name)
     axes.step(course.numbers, best, where="post", color=BLUE, linewidth=2.0, label="best feasible so far")
-    shown = np.concatenate([best[np.isfinite(best)], np.nanpercentile(values[~missed], VIEWED)])
+    shown = np.concatenate([best[np.isfinite(best)], np.nanpercentile(values[course.feasible], VIEWED)])
     room = 0.06 * (np.ptp(shown) or abs(float(shown[0])) or 1.0)
     axes.set_ylim(float(shown.min()) - room, float(shown.max()) + room)
     _mark_first_feasible(axes, course)

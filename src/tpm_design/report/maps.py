@@ -85,7 +85,7 @@ def workspace_figure(survey: Survey, units: Units) -> Figure:
                 drawn.add(part)
         _draw_region(axes, view, frame)
         _draw_nearest(axes, view, frame)
-        _note_singular_plane(axes, view, frame.kind)
+        _note_plane(axes, view, frame.kind)
     figure.legend(
         handles=[*_fill_keys(survey), *_locus_keys(frame.kind, drawn), *_region_keys(survey),
             *_nearest_keys(survey)],
@@ -120,6 +120,7 @@ def conditioning_figure(survey: Survey, shown: ConditioningShown, units: Units) 
             edge.set_clip_path(reachable, transform=axes.transData)
         _draw_lines(axes, view.reach_outline(), frame.factor, INK, 1.0, "solid")
         _draw_region(axes, view, frame)
+        _note_plane(axes, view, frame.kind)
     if filled is not None:
         bar = figure.colorbar(filled, ax=panels, shrink=0.8, aspect=28, pad=0.015)
         bar.set_label(plain(shown.name), fontsize=TEXT)
@@ -205,13 +206,13 @@ def _draw_region(axes: Axes, view: Slice, frame: _Frame) -> None:
     axes.plot(outline[:, 0], outline[:, 1], color=GREEN, linewidth=2.4, zorder=4)
 
 
-def _note_singular_plane(axes: Axes, view: Slice, kind: MechanismKind) -> None:
+def _note_plane(axes: Axes, view: Slice, kind: MechanismKind) -> None:
+    """Say so where a plane is not what it seems."""
     names = [name for part, name in enumerate(kind.determinants) if view.vanishing(part)]
-    if names:
-        axes.text(
-            0.5, 0.98, f"singular all over ({', '.join(names)})", transform=axes.transAxes, ha="center",
-            va="top", fontsize=SMALL, color=INK,
-        )  # fmt: skip
+    words = f"singular all over ({', '.join(names)})" if names else ""
+    if not view.reachable:
+        words = "nothing of this plane is within reach"
+    axes.text(0.5, 0.99, words, transform=axes.transAxes, ha="center", va="top", fontsize=SMALL, color=INK)
 
 
 def _fill_keys(survey: Survey) -> list[Patch | Line2D]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from tpm_design.problem import Evaluation, Goal
-from tpm_design.report.escape import code, table, text
+from tpm_design.report.escape import code, code_cell, table, text
 from tpm_design.report.figures import FIGURES, Picture
 from tpm_design.report.readings import AT_BOUND, at_end, limiting, nearest_constraint, readings
 from tpm_design.report.reported import Reported
@@ -125,11 +125,11 @@ def _design(reported: Reported) -> list[str]:
     for column in parameter_columns(problem, units):
         value = reported.best.evaluation.design[column.name]
         parameter = problem.kind.parameter(column.name)
-        shown = code(value) if isinstance(value, str) else f"{units.from_si(value, column.unit):.6g}"
+        shown = code_cell(value) if isinstance(value, str) else f"{units.from_si(value, column.unit):.6g}"
         meaning = parameter.description if parameter else _own_meaning(column.name)
         rows.append(
             [
-                code(column.name),
+                code_cell(column.name),
                 shown,
                 NONE if column.unit in {"", "-"} else units.name(column.unit),
                 text(range_text(variables.get(column.name), units)),
@@ -171,14 +171,16 @@ def _metric_row(reported: Reported, evaluation: Evaluation, goal: Goal) -> list[
     def shown(value: float, digits: int) -> str:
         return f"{units.from_si(value, unit):.{digits}g}" if math.isfinite(value) else NONE
 
+    value = evaluation.metrics.get(goal.label, math.nan)
+    error = evaluation.errors.get(goal.label, math.nan) if math.isfinite(value) else math.nan
     slack = evaluation.slacks.get(goal.label)
     return [
-        code(goal.label),
-        shown(evaluation.metrics.get(goal.label, math.nan), 6),
-        shown(evaluation.errors.get(goal.label, math.nan), 2),
+        code_cell(goal.label),
+        shown(value, 6),
+        shown(error, 2),
         _unit_name(reported, goal),
         text(asked(goal, units, unit)),
-        NONE if slack is None else shown(slack, 3),
+        NONE if slack is None or not math.isfinite(value) else shown(slack, 3),
         NONE if slack is None else ("yes" if slack >= 0.0 else "**no**"),
     ]
 
@@ -215,11 +217,11 @@ def _missing(reported: Reported, evaluation: Evaluation) -> Iterable[str]:
     for reading in readings(reported.problem, evaluation):
         if not reading.met:
             unit = goal_unit(reported.problem, reading.goal)
-            shortfall = units.written(-reading.slack, unit, 3)
-            yield (
-                f"- {code(reading.goal.label)} {text(asked(reading.goal, units, unit))} is missed by "
-                f"{text(shortfall)}"
-            )
+            found = "it has no value"
+            if math.isfinite(reading.value):
+                shortfall = units.written(-reading.slack, unit, 3)
+                found = f"it is {units.written(reading.value, unit)}, missed by {shortfall}"
+            yield f"- {code(reading.goal.label)} {text(f'{asked(reading.goal, units, unit)}: {found}')}"
     if evaluation.reason:
         yield ""
         yield f"Reason noted by the evaluation: {text(evaluation.reason)}."

@@ -46,11 +46,12 @@ def rooms_figure(reported: Reported) -> Figure | None:
     axes = figure.subplots()
     low, high = _limits(rows)
     for place, row in enumerate(rows):
-        colour, length = _colour(row), max(low, min(high, row.share))
+        share = row.share if math.isfinite(row.value) else 0.0
+        colour, length = _colour(row), max(low, min(high, share))
         axes.barh(place, length, height=0.5, color=colour)
         if abs(length) < 0.01 * (high - low):  # too short for a bar
             axes.plot([length], [place], marker="o", color=colour, markersize=9, clip_on=False, zorder=3)
-        if length != row.share:  # the bar goes on
+        if length != share:  # the bar goes on
             inside = length - math.copysign(0.015 * (high - low), length)
             marker = ">" if length > 0.0 else "<"
             axes.plot([inside], [place], marker=marker, color="white", markersize=8, zorder=3)
@@ -82,7 +83,7 @@ def _colour(row: Reading) -> str:
 
 def _limits(rows: Sequence[Reading]) -> tuple[float, float]:
     """Ends of the axis: what the shares need, at most the whole bound on either side."""
-    shares = [row.share for row in rows]
+    shares = [row.share for row in rows if math.isfinite(row.value)]
     low, high = max(-FULL, 1.1 * min(0.0, *shares)), min(FULL, 1.1 * max(0.0, *shares))
     return low, max(high, SHORTEST if low > -SHORTEST else 0.0)
 
@@ -100,9 +101,12 @@ def _row_name(row: Reading, reported: Reported) -> str:
 
 def _reading_text(row: Reading, problem: Problem, units: Units) -> str:
     unit = goal_unit(problem, row.goal)
-    value = units.written(row.value, unit, 4) if math.isfinite(row.value) else "no value"
+    if not math.isfinite(row.value):
+        return "no value"
     word = "room" if row.met else "missed by"
-    return f"{value}\n{word} {units.written(abs(row.slack), unit, 3)} ({100.0 * abs(row.share):.3g} %)"
+    percent = 100.0 * abs(row.share)
+    share = f"{percent:.0f}" if percent >= 100.0 else f"{percent:.3g}"
+    return f"{units.written(row.value, unit, 4)}\n{word} {units.written(abs(row.slack), unit, 3)} ({share} %)"
 
 
 def rooms_finding(reported: Reported) -> str:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.metrics.context import Context
 from tpm_design.report.aspect import ChosenAspect
 from tpm_design.workspace.aspects import locate
@@ -129,6 +128,11 @@ class Slice:
         """Where one determinant vanishes within reach: polylines (K, 2) in metres."""
         return zero_lines(self.across, self.up, self.determinants[part])
 
+    @property
+    def reachable(self) -> bool:
+        """Whether any pose of the plane is within reach."""
+        return bool((self.reach >= 0.0).any())
+
     def vanishing(self, part: int) -> bool:
         """Whether a determinant vanishes all over the reachable part of the plane."""
         values = self.determinants[part][np.isfinite(self.determinants[part])]
@@ -182,14 +186,14 @@ def _aspect_field(
         patch = labels == label
         inside = np.flatnonzero(patch.ravel())
         pose = poses[inside[np.argmax(values[inside])]]
-        if inside.size < SMALLEST_PATCH or not _belongs(context.mechanism, context, aspect, pose):
+        if inside.size < SMALLEST_PATCH or not _belongs(context, aspect, pose):
             field[patch] *= -1.0
-    return field
+    return np.asarray(field)
 
 
-def _belongs(mechanism: Mechanism, context: Context, aspect: ChosenAspect, pose: FloatArray) -> bool:
+def _belongs(context: Context, aspect: ChosenAspect, pose: FloatArray) -> bool:
     at = (float(pose[0]), float(pose[1]), float(pose[2]))
-    return locate(mechanism, context.mode, aspect.field, at) == aspect.component
+    return locate(context.mechanism, context.mode, aspect.field, at) == aspect.component
 
 
 def zero_lines(across: FloatArray, up: FloatArray, values: FloatArray) -> list[FloatArray]:

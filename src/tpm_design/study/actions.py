@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tpm_design.study.study import Study
+
+NOT_CERTIFIED = "The study's tolerances are kept in study.yaml; this version proves nothing about them."
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,8 @@ def optimize_study(
 
     began = time.perf_counter()
     result = search(study.problem, plan, workers=workers, record=record)
+    if study.tolerance:
+        result = replace(result, remarks=(*result.remarks, NOT_CERTIFIED))
     if writer is not None:
         summary = {
             "status": result.status,

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.workspace.aspects import RayField
@@ -94,6 +96,14 @@ def _integrate(
     return volume, total, above, least
 
 
+@cache
+def _nodes() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places in [0, 1] and weights, crowded at both ends of a segment."""
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
+    angles = 0.5 * np.pi * (nodes + 1.0)
+    return 0.5 * (1.0 - np.cos(angles)), weights * 0.25 * np.pi * np.sin(angles)
+
+
 def conditioning_averages(
     geometry: object,
     signs: object,
@@ -110,10 +120,6 @@ def conditioning_averages(
     """
     keep = slice(None) if component is None else field.component == component
     chosen = (field.segments.ray[keep], field.segments.start[keep], field.segments.end[keep])
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
-    angles = 0.5 * np.pi * (nodes + 1.0)
-    places = 0.5 * (1.0 - np.cos(angles))
-    shares = weights * 0.25 * np.pi * np.sin(angles)
     volume, total, above, least = _integrate(
         geometry,
         signs,
@@ -125,7 +131,7 @@ def conditioning_averages(
         field.rays.directions,
         field.rays.weights,
         chosen,
-        (places, shares),
+        _nodes(),
     )
     cell = float(abs(np.prod(field.scale)))
     return Averages(cell * volume, cell * total, cell * above, least if volume > 0.0 else 0.0)

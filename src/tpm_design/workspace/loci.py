@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
+from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.pointwise import reach_row, singularity_row
 from tpm_design.workspace.indices import determinant_at
 from tpm_design.workspace.poses import workspace_margin
@@ -28,6 +29,10 @@ GROWTH = 1.12
 REACH_TOLERANCE = 1e-9
 FINEST_STEP = 1e-6
 ERROR_FLOOR = 1e-5
+# a slide that ends nearer to a bound of reach than this share of its first step goes on along the rim
+RIM_REACH = 0.1
+RIM_STEPS = 12
+RIM_DIFFERENCE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -245,6 +250,109 @@ def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore
 
 
 @inner
+def _nearest_leg(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """(which bound of reach is the nearest, its margin)."""
+    margins = equations.leg_margins(geometry, mode, x, y, z)
+    chosen = 0
+    for k in range(len(margins)):
+        if margins[k] < margins[chosen]:
+            chosen = k
+    return chosen, margins[chosen]
+
+
+@inner
+def _leg_gradient(geometry, mode, leg, x, y, z, h):  # type: ignore[no-untyped-def]
+    gx = (
+        equations.leg_margins(geometry, mode, x + h, y, z)[leg]
+        - equations.leg_margins(geometry, mode, x - h, y, z)[leg]
+    )
+    gy = (
+        equations.leg_margins(geometry, mode, x, y + h, z)[leg]
+        - equations.leg_margins(geometry, mode, x, y - h, z)[leg]
+    )
+    gz = (
+        equations.leg_margins(geometry, mode, x, y, z + h)[leg]
+        - equations.leg_margins(geometry, mode, x, y, z - h)[leg]
+    )
+    return 0.5 * gx / h, 0.5 * gy / h, 0.5 * gz / h
+
+
+@inner
+def _rim_point(geometry, mode, part, leg, start, width):  # type: ignore[no-untyped-def]
+    """(found, pose, direction along the rim) where the locus meets a bound of reach, near ``start``.
+
+    The determinant goes with the root of the margin inside the bound, so that the locus meets it at a
+    tangent; just outside, where the root is clamped, it is smooth, and that is where it is followed.
+    """
+    x, y, z = start
+    h = RIM_DIFFERENCE * width
+    for _ in range(RIM_STEPS):
+        for _ in range(3):
+            nx, ny, nz = _leg_gradient(geometry, mode, leg, x, y, z, h)
+            square = nx * nx + ny * ny + nz * nz
+            if not square > 0.0:
+                return False, start, start
+            excess = equations.leg_margins(geometry, mode, x, y, z)[leg] + 0.5 * REACH_TOLERANCE
+            share = excess / square
+            x, y, z = x - share * nx, y - share * ny, z - share * nz
+        size = math.sqrt(square)
+        n = (nx / size, ny / size, nz / size)
+        a = _perpendicular(n)
+        b = (n[1] * a[2] - n[2] * a[1], n[2] * a[0] - n[0] * a[2], n[0] * a[1] - n[1] * a[0])
+        value = determinant_at(geometry, mode, part, x, y, z)
+        ga = _along(geometry, mode, part, (x, y, z), a, h) - _along(geometry, mode, part, (x, y, z), a, -h)
+        gb = _along(geometry, mode, part, (x, y, z), b, h) - _along(geometry, mode, part, (x, y, z), b, -h)
+        ga, gb = 0.5 * ga / h, 0.5 * gb / h
+        slope = math.sqrt(ga * ga + gb * gb)
+        if not slope > 0.0:
+            return False, start, start
+        way = -value / slope
+        if abs(way) <= 1e-13 * width + 1e-15:
+            u, v = -gb / slope, ga / slope
+            rim = (u * a[0] + v * b[0], u * a[1] + v * b[1], u * a[2] + v * b[2])
+            return abs(value) <= 1e-10, (x, y, z), rim
+        u, v = way * ga / slope, way * gb / slope
+        x, y, z = x + u * a[0] + v * b[0], y + u * a[1] + v * b[1], z + u * a[2] + v * b[2]
+        if (x - start[0]) ** 2 + (y - start[1]) ** 2 + (z - start[2]) ** 2 > 4.0 * width * width:
+            return False, start, start
+    return False, start, start
+
+
+@inner
+def _slide_on_rim(geometry, mode, region, part, start, best, step, smallest):  # type: ignore[no-untyped-def]
+    """Least signed distance along the rim of the locus, from a pose of the locus near a bound of reach."""
+    leg, _ = _nearest_leg(geometry, mode, start[0], start[1], start[2])
+    x, y, z = start
+    found, pose, rim = _rim_point(geometry, mode, part, leg, start, step)
+    if not found or workspace_margin(geometry, mode, pose[0], pose[1], pose[2]) < -REACH_TOLERANCE:
+        return best, x, y, z
+    here = signed_distance(region, pose[0], pose[1], pose[2])
+    for _ in range(SLIDES):
+        if step <= smallest:
+            break
+        u = nearest(region, pose[0], pose[1], pose[2])
+        foot = (u[0] - pose[0]) * rim[0] + (u[1] - pose[1]) * rim[1] + (u[2] - pose[2]) * rim[2]
+        moved = False
+        for trial in range(3):
+            way = foot if trial == 0 else (step if trial == 1 else -step)
+            if abs(way) <= smallest:
+                continue
+            point = (pose[0] + way * rim[0], pose[1] + way * rim[1], pose[2] + way * rim[2])
+            found, there, along = _rim_point(geometry, mode, part, leg, point, max(abs(way), step))
+            if found and workspace_margin(geometry, mode, there[0], there[1], there[2]) >= -REACH_TOLERANCE:
+                distance = signed_distance(region, there[0], there[1], there[2])
+                if distance < here:
+                    moved = distance < here - 1e-4 * step
+                    here, pose, rim = distance, there, along
+                    break
+        if not moved:
+            step *= 0.35
+    if here < best:
+        return here, pose[0], pose[1], pose[2]
+    return best, x, y, z
+
+
+@inner
 def _perpendicular(normal):  # type: ignore[no-untyped-def]
     """A unit vector perpendicular to a unit vector."""
     nx, ny, nz = normal
@@ -282,6 +390,10 @@ def _best_slide(geometry, mode, region, part, starts, distances, stride, step, s
         chosen[k] = pick
         start = (starts[pick, 0], starts[pick, 1], starts[pick, 2])
         found = _slide(geometry, mode, region, part, start, step, smallest)
+        if found[0] < math.inf:
+            pose = (found[1], found[2], found[3])
+            if _nearest_leg(geometry, mode, pose[0], pose[1], pose[2])[1] < RIM_REACH * step:
+                found = _slide_on_rim(geometry, mode, region, part, pose, found[0], step, smallest)
         if found[0] < best:
             best, bx, by, bz = found
     return best, bx, by, bz

@@ -1,0 +1,145 @@
+"""What every registered mechanism must do, without naming any."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tpm_design.errors import ParameterError
+from tpm_design.mechanisms import MECHANISMS
+from tpm_design.mechanisms.base import MechanismKind
+from tpm_design.mechanisms.mechanism import Mechanism, Mode
+
+KINDS = list(MECHANISMS.values())
+
+
+def first_mode(mechanism: Mechanism) -> Mode:
+    return mechanism.mode_of({field.name: "+" * field.length for field in mechanism.kind.mode_fields})
+
+
+def sample_poses(mechanism: Mechanism, mode: Mode, count: int) -> np.ndarray:
+    """Poses well inside the mode's workspace, seeded."""
+    random = np.random.default_rng(5)
+    radius = mechanism.reach_radius()
+    poses = random.uniform(-radius, radius, (20000, 3))
+    margins = mechanism.margins(poses, mode)
+    inside = margins["reach"] > 0.05 * radius
+    for name in mechanism.kind.determinants:
+        inside &= np.abs(np.nan_to_num(margins[name])) > 0.05
+    return poses[inside][:count]
+
+
+@pytest.fixture(params=KINDS, ids=lambda kind: kind.name)
+def kind(request: pytest.FixtureRequest) -> MechanismKind:
+    found: MechanismKind = request.param
+    return found
+
+
+@pytest.fixture
+def machine(kind: MechanismKind) -> Mechanism:
+    return kind.build(kind.example, {})
+
+
+def test_every_field_of_the_documentation_is_filled(kind: MechanismKind) -> None:
+    assert kind.title
+    assert kind.source
+    assert kind.parameters
+    assert set(kind.example) == {parameter.name for parameter in kind.parameters}
+    for thing in (*kind.parameters, *kind.mode_fields, *kind.limits):
+        assert thing.description
+    for singularity in kind.singularities:
+        assert singularity.condition
+        assert singularity.equation
+    assert set(kind.determinants) <= {singularity.name for singularity in kind.singularities}
+
+
+@pytest.mark.parametrize("drive_index", [0, 1])
+def test_jacobian_is_the_derivative_of_the_inverse_map(machine: Mechanism, drive_index: int) -> None:
+    if drive_index >= len(machine.kind.drives):
+        pytest.skip("one drive only")
+    drive = machine.kind.drives[drive_index]
+    mode = first_mode(machine)
+    poses = sample_poses(machine, mode, 40)
+    assert len(poses) == 40
+    jacobians = machine.jacobian(poses, mode, drive=drive)
+    errors = []
+    for step in (1e-3, 5e-4):
+        h = step * machine.reach_radius()
+        slopes = np.stack(
+            [
+                (
+                    machine.ik(poses + h * axis, mode, drive=drive)
+                    - machine.ik(poses - h * axis, mode, drive=drive)
+                )
+                / (2.0 * h)
+                for axis in np.eye(3)
+            ],
+            axis=-1,
+        )
+        residual = jacobians @ slopes - np.eye(3)
+        errors.append(np.abs(residual).max(axis=(1, 2)))
+    small = errors[0] < 1e-8
+    assert np.median(errors[0]) < 1e-2
+    assert np.all(small | (errors[1] < 0.3 * errors[0]))
+
+
+def test_margins_keep_their_promises(machine: Mechanism) -> None:
+    mode = first_mode(machine)
+    random = np.random.default_rng(6)
+    radius = machine.reach_radius()
+    poses = random.uniform(-1.3 * radius, 1.3 * radius, (5000, 3))
+    margins = machine.margins(poses, mode)
+    inside = margins["reach"] >= 0.0
+    assert 0 < inside.sum() < len(poses)
+    assert np.array_equal(inside, ~np.isnan(machine.ik(poses, mode)).any(axis=1))
+    for name in ("serial", *machine.kind.determinants):
+        assert np.isnan(margins[name][~inside]).all()
+        assert (np.abs(margins[name][inside]) <= 1.0 + 1e-12).all()
+    assert (np.linalg.norm(poses[inside], axis=1) <= radius).all()
+
+
+def test_scale_changes_lengths_and_nothing_else(kind: MechanismKind, machine: Mechanism) -> None:
+    scaled = kind.build(
+        {
+            parameter.name: kind.example[parameter.name] * (3.0 if parameter.dimension == "length" else 1.0)
+            for parameter in kind.parameters
+        },
+        {},
+    )
+    mode = first_mode(machine)
+    poses = sample_poses(machine, mode, 50)
+    small, large = machine.margins(poses, mode), scaled.margins(3.0 * poses, mode)
+    assert np.allclose(large["reach"], 3.0 * small["reach"], rtol=1e-12)
+    for name in ("serial", *kind.determinants):
+        assert np.allclose(large[name], small[name], atol=1e-12)
+    factor = 1.0 if kind.actuator_unit == "m" else 3.0
+    assert np.allclose(scaled.jacobian(3.0 * poses, mode), factor * machine.jacobian(poses, mode), rtol=1e-9)
+
+
+def test_inverse_then_forward_comes_back(machine: Mechanism) -> None:
+    mode = first_mode(machine)
+    poses = sample_poses(machine, mode, 5)
+    for drive in machine.kind.drives:
+        for pose, q in zip(poses, machine.ik(poses, mode, drive=drive), strict=True):
+            found = machine.fk(q, mode, drive=drive)
+            assert np.abs(found - pose).max(axis=1).min() < 1e-10
+
+
+def test_impossible_parameters_are_refused_in_words(kind: MechanismKind) -> None:
+    for parameter in kind.parameters:
+        missing = {name: value for name, value in kind.example.items() if name != parameter.name}
+        with pytest.raises(ParameterError, match=parameter.name):
+            kind.build(missing, {})
+        with pytest.raises(ParameterError, match=parameter.name):
+            kind.build({**kind.example, parameter.name: float("nan")}, {})
+    with pytest.raises(ParameterError, match="no parameter"):
+        kind.build({**kind.example, "nonsense": 1.0}, {})
+
+
+def test_bad_poses_are_refused_in_words(machine: Mechanism) -> None:
+    mode = first_mode(machine)
+    for poses in ([[1.0, 2.0]], [[float("inf"), 0.0, 0.0]], [["a", "b", "c"]]):
+        with pytest.raises(ParameterError):
+            machine.ik(poses, mode)
+    with pytest.raises(ParameterError, match="drive"):
+        machine.ik([[0.1, 0.1, 0.1]], mode, drive="wind")
