@@ -12,10 +12,10 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
+
 from machines import DESIGNS, machine
 from numpy_formulas import conditioning, margins
 from row import Row, interleaved, seconds
-
 from tpm_design.mechanisms.pointwise import frobenius_row, reach_row, singularity_row
 
 POSES = 20_000
@@ -44,7 +44,8 @@ def c_call(program: Path, folder: Path, what: str) -> Call:
     """Seconds by C, in a process of its own: -ffast-math flushes denormals for the whole process."""
 
     def call() -> float:
-        words = [str(program), what, str(POSES), str(REPEATS), str(folder / "in"), str(folder / f"{what}.out")]
+        files = folder / "in", folder / f"{what}.out"
+        words = [str(word) for word in (program, what, POSES, REPEATS, *files)]
         output = subprocess.run(words, check=True, capture_output=True, text=True).stdout
         return median(float(line) for line in output.split())
 
@@ -103,10 +104,10 @@ def rows() -> list[Row]:
             times = interleaved(calls, ROUNDS)
             rates = [POSES / time / 1e6 for time in times]
             values = np.vstack([legs, side, determinants]) if what == "margins" else condition[None]
-            expected = np.atleast_2d(numpy(x, y, z))
+            expected = np.atleast_2d(np.asarray(numpy(x, y, z)))
             assert_close(values, expected, "NumPy")
             if program is None:
-                table.append(Row(f"{title}: C", f"{rates[0]:.0f} M/s", "no compiler", "-", f"≥ {C_TARGET}", None))
+                table.append(Row(f"{title}: C", f"{rates[0]:.1f} M/s", "no compiler", "-", "-", None))
             else:
                 assert_close(values, np.fromfile(folder / f"{what}.out").reshape(values.shape), "C")
                 table.append(against(f"{title}: C", rates[0], rates[2], C_TARGET))
@@ -121,4 +122,5 @@ def against(name: str, ours: float, peer: float, target: float) -> Row:
 
 def assert_close(ours: np.ndarray, peer: np.ndarray, name: str) -> None:
     if not np.allclose(ours, peer, rtol=1e-9, atol=1e-9):
-        raise SystemExit(f"{name} computes something else: the largest difference is {np.abs(ours - peer).max()}")
+        difference = np.abs(ours - peer).max()
+        raise SystemExit(f"{name} computes something else: the largest difference is {difference}")

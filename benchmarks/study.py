@@ -45,8 +45,9 @@ def rows() -> list[Row]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         first = optimised(folder / "cache", folder / "first")
-        # the largest of all children so far, in kB on Linux and in bytes on macOS
-        peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+        # of the largest child so far, in kB on Linux and in bytes on macOS
+        unit = 1e6 if sys.platform == "darwin" else 1e3
+        peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / unit
         again = optimised(folder / "cache", folder / "again")
         count = evaluations(folder / "first")
     return [

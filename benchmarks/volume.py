@@ -6,11 +6,11 @@ import math
 from functools import partial
 
 import numpy as np
+from scipy import ndimage
+
 from machines import DESIGNS, machine
 from numpy_formulas import margins, reachable
 from row import Row, interleaved, seconds
-from scipy import ndimage
-
 from tpm_design.workspace.volume import VolumeKind, workspace_volume
 
 ERROR = 1e-3
@@ -68,9 +68,8 @@ def rows() -> list[Row]:
             call = partial(workspace_volume, uru, mode, kind, rtol=ERROR)
             found = call().value / VOLUMES[name, kind] - 1.0
             size = reliable_size(name, kind)
-            ours, peer = interleaved(
-                [partial(seconds, call, REPEATS), partial(seconds, partial(counted, name, kind, size))], ROUNDS
-            )
+            count = partial(counted, name, kind, size)
+            ours, peer = interleaved([partial(seconds, call, REPEATS), partial(seconds, count)], ROUNDS)
             table.append(
                 Row(
                     f"volume {name} {kind}",

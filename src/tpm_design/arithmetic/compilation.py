@@ -25,7 +25,7 @@ FAST: Any = {"fastmath": FAST_MATH, "error_model": "numpy", "forceinline": True}
 STRICT: Any = {"fastmath": False, "error_model": "numpy", "forceinline": False}
 
 
-class _InnerFunction(CPUDispatcher):  # type: ignore[misc]
+class _InnerFunction(CPUDispatcher):
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         # it has no entry from Python: calling it as other dispatchers are called would crash
         raise TypeError(f"{self.py_func.__name__} serves compiled code only")

@@ -4,8 +4,6 @@
 part of the compiled type. Numbers and plain elements mixed in are constants.
 """
 
-# mypy: disallow-untyped-calls=False, disallow-untyped-decorators=False
-
 from __future__ import annotations
 
 import inspect

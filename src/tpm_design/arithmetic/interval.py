@@ -8,8 +8,6 @@ to two ulps, x ∓ (|x|·2⁻⁵² + 2⁻¹⁰⁷⁴), which needs no change of 
 The functions below are the only implementation: Python calls them as they are, Numba compiles them.
 """
 
-# mypy: disallow-untyped-calls=False, disallow-untyped-decorators=False
-
 from __future__ import annotations
 
 import operator

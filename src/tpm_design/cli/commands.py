@@ -6,9 +6,7 @@ import json
 import math
 import os
 import sys
-
 from collections.abc import Sequence
-
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +19,7 @@ from tpm_design.mechanisms import mechanism_kind
 from tpm_design.problem import Design, evaluate
 from tpm_design.runs.folder import STUDY, newest_run, read_run
 from tpm_design.runs.optimize import check_plan
+from tpm_design.runs.search import best_entry
 from tpm_design.study import Study, choose_design, dump_yaml, load_study, study_schema, template
 from tpm_design.study.actions import optimize_study, plan_of, pose_values
 from tpm_design.units import unit_for
@@ -66,16 +65,17 @@ def print_schema() -> int | None:
 
 
 def open_study(path: Path) -> tuple[Study, Design | None]:
-    """A study from its file, or from a run folder with the run's best design."""
+    """A study from its file, or from a run folder with the best design of the run, finished or not."""
     if not path.is_dir():
         return load_study(path), None
     run = read_run(path)
     study = load_study(path / STUDY)
-    if run.best is None:
+    best = run.best or best_entry(study.problem, run.entries)
+    if best is None:
         raise UsageError(
-            "This run has no best design.", where=str(path), remedy="Evaluate its study.yaml instead."
+            "Nothing was evaluated in this run.", where=str(path), remedy="Evaluate its study.yaml instead."
         )
-    return study, run.best.evaluation.design
+    return study, best.evaluation.design
 
 
 def evaluate_one(
@@ -161,12 +161,7 @@ def _print_pose(
     if as_json:
         print(json.dumps(data, ensure_ascii=False))
         return None
-    print(
-        table(
-            ["design", "value", ""],
-            [row[:2] + [""] for row in design_rows(study.problem, units, _bare(design))],
-        )
-    )
+    print(table(["design", "value"], [row[:2] for row in design_rows(study.problem, units, _bare(design))]))
     rows = []
     for drive, entry in data["actuators"].items():
         rows.append([f"{drive} coordinates [{entry['unit']}]", _row_text(entry["value"])])

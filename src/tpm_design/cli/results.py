@@ -132,7 +132,7 @@ def _at_bounds(problem: Problem, evaluation: Evaluation) -> list[str]:
 
 def evaluation_data(problem: Problem, units: Units, evaluation: Evaluation) -> dict[str, Any]:
     """One evaluation for --json, in the study's units, units beside every number."""
-    design = {}
+    design: dict[str, dict[str, Any]] = {}
     for column in parameter_columns(problem, units):
         value = evaluation.design[column.name]
         if isinstance(value, str):

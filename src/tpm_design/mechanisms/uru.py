@@ -5,8 +5,6 @@ Singularity Analysis", Robotics 9(3), 60, 2020. Equation numbers in brackets are
 is used with its indices corrected.
 """
 
-# mypy: disallow-untyped-calls=False
-
 from __future__ import annotations
 
 import itertools

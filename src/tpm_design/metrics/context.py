@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
-from tpm_design.workspace.aspects import RayField, locate, locus_points, mode_field, region_field
+from tpm_design.workspace.aspects import RayField, locate, mode_field, region_field
 from tpm_design.workspace.extremes import Extreme, least_over_region
 from tpm_design.workspace.indices import DETERMINANT, EXTENT, REACH, Index
 from tpm_design.workspace.loci import LocusDistance, locus_distance
 from tpm_design.workspace.region_geometry import PlacedRegion
 from tpm_design.workspace.sampling import feelers, lattice
+from tpm_design.workspace.survey import Survey, survey, survey_crossings
 from tpm_design.workspace.volume import coarser, rays_for
 
 FEELERS_PER_SAMPLE = 0.8
-SURVEY_RAYS_PER_SAMPLE = 2
 
 
 @dataclass(frozen=True)
@@ -107,21 +107,14 @@ class Context:
         return Sides(sign * extreme.value, extreme.error, tuple(sign * piece for piece in extreme.pieces))
 
     @cached_property
-    def _survey(self) -> RayField:
-        return mode_field(
-            self.mechanism, self.mode, order=SURVEY_RAYS_PER_SAMPLE * self.region_samples, sided=True
-        )
+    def _survey(self) -> Survey:
+        return survey(self.mechanism, self.mode, order=self.region_samples)
 
     def locus_distance(self, part: int) -> LocusDistance:
         """Distance (m) to the locus of one determinant, for a region reachable throughout.
 
-        Feelers from the region see what is near; where they meet nothing, rays through the whole mode look
-        for what is small and far.
+        Feelers from the region see what is near, a survey of the whole mode what is small or far.
         """
-        near = self._locus_distance(part, np.empty((0, 3)))
-        return near if near.pose is not None else self._locus_distance(part, locus_points(self._survey, part))
-
-    def _locus_distance(self, part: int, known: NDArray[np.float64]) -> LocusDistance:
         count = max(3, round(FEELERS_PER_SAMPLE * self.region_samples))
         points, normals = feelers(self.placed, count)
         return locus_distance(
@@ -133,9 +126,9 @@ class Context:
             grid=self.grid,
             feeler_points=points,
             feeler_normals=normals,
-            known=known,
+            known=survey_crossings(self.mechanism, self.mode, self._survey, part),
             spacing=self.spacing,
-            limit=0.0 if len(known) else 2.0 * self.mechanism.reach_radius(),
+            limit=2.0 * self.mechanism.reach_radius(),
         )
 
     @cached_property

@@ -9,7 +9,18 @@ from matplotlib.ticker import MaxNLocator
 
 from tpm_design.report.history import History, history
 from tpm_design.report.reported import Reported
-from tpm_design.report.style import BLUE, GREEN, GREY, SMALL, TEXT, VERMILLION, new_figure, plain, tidy, title
+from tpm_design.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    SMALL,
+    TEXT,
+    VERMILLION,
+    new_figure,
+    tidy,
+    title,
+    wrapped,
+)
 from tpm_design.runs.tables import goal_unit
 
 VIEWED = (2.0, 98.0)
@@ -17,14 +28,15 @@ VIEWED = (2.0, 98.0)
 
 
 def convergence_figure(reported: Reported) -> Figure | None:
-    """None where nothing was evaluated."""
+    """None where nothing could be evaluated."""
     course = history(reported.problem, reported.run.entries)
-    missed = course.violation[course.violation > 0.0]
     has_objective = bool(course.feasible.any())
-    if not has_objective and not missed.size:
+    if not has_objective and not (course.violation > 0.0).any():
         return None
-    figure = new_figure(7.5, 5.2 if has_objective and missed.size else 4.0, "constrained")
-    if has_objective and missed.size:
+    # once a design is feasible the least violation is 0 and has nothing more to tell
+    both = has_objective and bool((course.violation[: int(np.argmax(course.feasible))] > 0.0).any())
+    figure = new_figure(7.5, 5.2 if both else 4.0, "constrained")
+    if both:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1.2))
         _draw_objective(upper, course, reported)
         _draw_violation(lower, course)
@@ -80,7 +92,7 @@ def _draw_objective(axes: Axes, course: History, reported: Reported) -> None:
     room = 0.06 * (np.ptp(shown) or abs(float(shown[0])) or 1.0)
     axes.set_ylim(float(shown.min()) - room, float(shown.max()) + room)
     _mark_first_feasible(axes, course)
-    axes.set_ylabel(plain(f"{goal.label} [{units.name(unit)}]"), fontsize=TEXT)
+    axes.set_ylabel(wrapped(f"{goal.label} [{units.name(unit)}]", 36), fontsize=TEXT)
     axes.legend(
         loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, fontsize=SMALL, markerscale=1.8
     )

@@ -11,12 +11,11 @@ from tpm_design.report.escape import code, code_cell, table, text
 from tpm_design.report.figures import FIGURES, Picture
 from tpm_design.report.readings import AT_BOUND, at_end, limiting, nearest_constraint, readings
 from tpm_design.report.reported import Reported
-from tpm_design.report.words import asked, centre_text, options_text, range_text, shape_text
+from tpm_design.report.words import MOST_LISTED, asked, centre_text, options_text, range_text, shape_text
 from tpm_design.runs.folder import DESIGNS, LOG, STUDY, SUMMARY, TABLE
 from tpm_design.runs.tables import goal_unit, parameter_columns
 
 NONE = "–"
-MOST_MODES = 8
 FILES = (
     (DESIGNS, "the result, with numeric errors"),
     (TABLE, "every evaluation"),
@@ -90,7 +89,7 @@ def _question(reported: Reported) -> list[str]:
         where = f"{shape_text(problem.region, units)}, {centre_text(problem, units)}"
         lines += ["", f"The useful region is {text(where)}."]
     modes = ", ".join(code(label) for label in problem.modes)
-    if len(problem.modes) > MOST_MODES:
+    if len(problem.modes) > MOST_LISTED:
         modes = f"any of {len(problem.modes)}"
     fields = ", ".join(field.name for field in problem.kind.mode_fields)
     lines += ["", f"Working mode ({text(fields)}): {modes}."]
@@ -261,9 +260,9 @@ def _search(reported: Reported) -> list[str]:
 def _provenance(summary: Any) -> Iterable[str]:
     versions, machine = summary.get("versions"), summary.get("machine")
     if isinstance(versions, dict):
-        yield "versions: " + ", ".join(f"{text(str(name))} {text(str(v))}" for name, v in versions.items())
+        yield text("versions: " + ", ".join(f"{name} {value}" for name, value in versions.items()))
     if isinstance(machine, dict):
-        yield "machine: " + ", ".join(f"{text(str(name))} {text(str(v))}" for name, v in machine.items())
+        yield text("machine: " + ", ".join(f"{name} {value}" for name, value in machine.items()))
 
 
 def _figures(pictures: Sequence[Picture]) -> list[str]:

@@ -84,7 +84,7 @@ def _colour(row: Reading) -> str:
 def _limits(rows: Sequence[Reading]) -> tuple[float, float]:
     """Ends of the axis: what the shares need, at most the whole bound on either side."""
     shares = [row.share for row in rows if math.isfinite(row.value)]
-    low, high = max(-FULL, 1.1 * min(0.0, *shares)), min(FULL, 1.1 * max(0.0, *shares))
+    low, high = max(-FULL, 1.1 * min([0.0, *shares])), min(FULL, 1.1 * max([0.0, *shares]))
     return low, max(high, SHORTEST if low > -SHORTEST else 0.0)
 
 

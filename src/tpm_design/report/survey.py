@@ -107,6 +107,8 @@ class Survey:
             return f"Conditioning {shown.name} through the middle of the singularity-free side"
         if not self.context.reachable:
             return f"Conditioning {shown.name}: the region is not wholly within reach"
+        if min((side.margin for side in self.context.sides), default=0.0) < 0.0:
+            return f"Conditioning {shown.name}: a singularity cuts the region"
         least = self.context.least(shown.index(self.context)).value
         bound = "" if shown.bound is None else f" (bound {shown.bound:g})"
         return f"Conditioning {shown.name}: at least {least:.3g} over the region{bound}"

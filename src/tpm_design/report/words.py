@@ -8,6 +8,8 @@ from tpm_design.problem import Goal, Problem, Variable
 from tpm_design.units import Units, si_unit
 from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere
 
+MOST_LISTED = 8
+
 
 def asked(goal: Goal, units: Units, unit: str) -> str:
     """``≥ 20 mm``, ``minimise``, ``recorded``."""
@@ -74,6 +76,8 @@ def range_text(variable: Variable | None, units: Units) -> str:
     if variable is None:
         return "fixed"
     unit = si_unit(variable.dimension)
+    if len(variable.values) > MOST_LISTED:
+        return f"one of {len(variable.values)}"
     if variable.values:
         return "one of " + ", ".join(
             value if isinstance(value, str) else f"{units.from_si(value, unit):.6g}"

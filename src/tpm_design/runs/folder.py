@@ -66,18 +66,19 @@ class RunWriter:
 
     def record(self, entry: Entry) -> None:
         """Append one evaluation and hand it to the operating system."""
-        self._log.write(json.dumps(entry_to_json(entry), ensure_ascii=False) + "\n")
+        self._log.write(_log_line(entry))
         self._table.write(csv_line(self._rows.row(entry)))
         self._log.flush()
         self._table.flush()
 
     def finish(self, entries: Sequence[Entry], best: Sequence[Entry], summary: Mapping[str, Any]) -> None:
-        """Put the table in order of ids and write the result."""
+        """Put both logs in order of ids, complete where a record was interrupted, and write the result."""
         self._table.close()
         self._log.close()
         ordered = sorted(entries, key=lambda entry: entry.number)
         text = csv_line(self._rows.headings()) + "".join(csv_line(self._rows.row(e)) for e in ordered)
         _replace(self.folder / TABLE, text)
+        _replace(self.folder / LOG, "".join(map(_log_line, ordered)))
         _replace(self.folder / DESIGNS, designs_table(self._problem, self._units, best))
         _replace(self.folder / SUMMARY, json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
 
@@ -87,6 +88,10 @@ def _replace(path: Path, text: str) -> None:
     part = path.with_name(path.name + ".part")
     part.write_text(text, encoding="utf-8")
     os.replace(part, path)
+
+
+def _log_line(entry: Entry) -> str:
+    return json.dumps(entry_to_json(entry), ensure_ascii=False) + "\n"
 
 
 def entry_to_json(entry: Entry) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -83,15 +83,12 @@ class EvaluationLog:
         return [self.entries[self._numbers[key]].evaluation for key in keys]
 
     def best(self) -> Entry | None:
-        """The feasible entry of least objective, else the one of least violation; None if empty."""
-        return min(self.entries, key=self.rank, default=None)
+        """As ``best_entry``."""
+        return best_entry(self.problem, self.entries)
 
     def rank(self, entry: Entry) -> tuple[float, float, int]:
-        """Sorts entries: feasible ones first by objective, then by violation; ties by number."""
-        objective = minimised(self.problem, entry.evaluation)
-        if entry.evaluation.status == "feasible":
-            return (0.0, objective, entry.number)
-        return (1.0 + entry.evaluation.violation, objective, entry.number)
+        """As ``rank``."""
+        return rank(self.problem, entry)
 
 
 @dataclass(frozen=True)
@@ -130,6 +127,19 @@ class UnitSearch:
         space = self.space.holding_discrete(evaluation.design).near(evaluation.design, share)
         sizes = tuple(len(evaluation.pieces.get(goal.label, (0.0,))) for goal in self.log.problem.constraints)
         return replace(self, space=space, start=space.point(evaluation.design), limit=limit, sizes=sizes)
+
+
+def rank(problem: Problem, entry: Entry) -> tuple[float, float, int]:
+    """Sorts entries: feasible ones first by objective, then by violation; ties by number."""
+    objective = minimised(problem, entry.evaluation)
+    if entry.evaluation.status == "feasible":
+        return (0.0, objective, entry.number)
+    return (1.0 + entry.evaluation.violation, objective, entry.number)
+
+
+def best_entry(problem: Problem, entries: Iterable[Entry]) -> Entry | None:
+    """The feasible entry of least objective, else the one of least violation; None if there is none."""
+    return min(entries, key=lambda entry: rank(problem, entry), default=None)
 
 
 def design_key(design: Design) -> Key:

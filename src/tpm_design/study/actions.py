@@ -126,7 +126,9 @@ def pose_values(study: Study, design: Design, pose: tuple[float, float, float]) 
     mechanism, mode = context.mechanism, context.mode
 
     def numbers(array: Any) -> Any:
-        return np.where(np.isfinite(array), array, None).tolist()
+        values = np.asarray(array).astype(object)
+        values[~np.isfinite(array)] = None
+        return values.tolist()
 
     return {
         "actuators": {d: numbers(mechanism.ik([pose], mode, drive=d)[0]) for d in mechanism.kind.drives},

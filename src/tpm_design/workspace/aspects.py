@@ -159,15 +159,3 @@ def locate(mechanism: Mechanism, mode: Mode, field: RayField, pose: tuple[float,
     )
     distances = np.linalg.norm(along[:, None] * chosen - offset, axis=1)
     return int(field.component[candidates[np.argmin(distances)]])
-
-
-def locus_points(field: RayField, part: int) -> NDArray[np.float64]:
-    """Poses (N, 3) where a determinant changes sign along the rays of a field."""
-    segments = field.segments
-    before, after = slice(0, -1), slice(1, None)
-    same_ray = segments.ray[before] == segments.ray[after]
-    flipped = ((segments.code[before] - 1) ^ (segments.code[after] - 1)) >> part & 1
-    touching = segments.end[before] == segments.start[after]
-    found = np.flatnonzero(same_ray & touching & (flipped == 1))
-    steps = field.rays.directions[segments.ray[found]] * np.asarray(field.scale)
-    return np.asarray(np.asarray(field.origin) + segments.end[found][:, None] * steps)

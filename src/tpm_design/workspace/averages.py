@@ -51,9 +51,9 @@ def _threshold_crossing(geometry, mode, frobenius, motor, threshold, origin, ste
 
 
 @kernel
-def _integrate(
+def _integrate(  # type: ignore[no-untyped-def]
     geometry, mode, frobenius, motor, threshold, origin, scale, directions, weights, segments, nodes
-):  # type: ignore[no-untyped-def]
+):
     rays, starts, ends = segments
     places, shares = nodes
     volume, total, above, least = 0.0, 0.0, 0.0, math.inf

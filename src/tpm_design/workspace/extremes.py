@@ -20,7 +20,7 @@ ERROR_FLOOR = 1e-10
 @dataclass(frozen=True)
 class Extreme:
     """``value`` in the index's unit, ``error``: what half the samples would have missed plus the polish's
-    last gain, ``pose`` (3,) in metres where it is attained. ``pieces``: the extremes found from each eighth
+    last gains, ``pose`` (3,) in metres where it is attained. ``pieces``: the extremes found from each eighth
     of the region, whose least (or greatest) is ``value``: smoother in the design than their minimum."""
 
     value: float
@@ -31,7 +31,7 @@ class Extreme:
 
 @inner
 def _polish(geometry, mode, region, index, start, value, step, smallest):  # type: ignore[no-untyped-def]
-    """Compass search inside the region from ``start``: (value, last decrease, x, y, z)."""
+    """Compass search inside the region from ``start``: (value, decrease by the smallest steps, x, y, z)."""
     x, y, z = start[0], start[1], start[2]
     last = 0.0
     while step > smallest:
@@ -48,51 +48,27 @@ def _polish(geometry, mode, region, index, start, value, step, smallest):  # typ
                 if trial < best:
                     best, bx, by, bz = trial, u[0], u[1], u[2]
         if best < value:
-            last = value - best
+            last += value - best
             # a second step the same way, while it pays
             u = nearest(region, 2.0 * bx - x, 2.0 * by - y, 2.0 * bz - z)
             trial = index_value(geometry, mode, index, u[0], u[1], u[2])
             value, x, y, z = best, bx, by, bz
             if trial < value:
+                last += value - trial
                 value, x, y, z = trial, u[0], u[1], u[2]
         else:
+            if 0.4 * step > smallest:
+                last = 0.0
             step *= 0.4
     return value, last, x, y, z
 
 
 @inner
-def _starts(values, points, stride, number, separation):  # type: ignore[no-untyped-def]
-    """Indices of the best lattice poses, apart from each other, of every ``stride``-th pose."""
-    chosen = np.full(number, -1, np.int64)
-    count = 0
-    for _ in range(number):
-        best = -1
-        for n in range(0, values.size, stride):
-            if best >= 0 and values[n] >= values[best]:
-                continue
-            near = False
-            for k in range(count):
-                m = chosen[k]
-                square = (
-                    (points[n, 0] - points[m, 0]) ** 2
-                    + (points[n, 1] - points[m, 1]) ** 2
-                    + (points[n, 2] - points[m, 2]) ** 2
-                )
-                near = near or square < separation * separation
-            if not near:
-                best = n
-        if best < 0:
-            break
-        chosen[count] = best
-        count += 1
-    return chosen[:count]
-
-
-@inner
-def _best_of_eighths(region, points, values):  # type: ignore[no-untyped-def]
-    """Index of the best lattice pose in each octant about the region's centre, −1 where there is none."""
+def _best_of_eighths(region, points, values, stride):  # type: ignore[no-untyped-def]
+    """Index of the best of every ``stride``-th lattice pose in each octant about the region's centre, −1
+    where there is none."""
     best = np.full(EIGHTHS, -1, np.int64)
-    for n in range(values.size):
+    for n in range(0, values.size, stride):
         eighth = 0
         for axis in range(3):
             if points[n, axis] > region.centre[axis]:
@@ -103,14 +79,14 @@ def _best_of_eighths(region, points, values):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _chosen(region, points, values, separation):  # type: ignore[no-untyped-def]
-    """Where to polish from: each eighth's best pose, and what every second pose alone would suggest."""
-    return _best_of_eighths(region, points, values), _starts(values, points, 2, 2, separation)
+def _chosen(region, points, values):  # type: ignore[no-untyped-def]
+    """Where to polish from: each eighth's best pose, and the best of every second pose alone."""
+    return _best_of_eighths(region, points, values, 1), _best_of_eighths(region, points, values, 2)
 
 
 @kernel
 def _polished(geometry, mode, region, index, points, values, chosen, step, smallest):  # type: ignore[no-untyped-def]
-    """(value, last decrease, x, y, z) (K, 5) from each chosen pose; rows of +inf where it is −1."""
+    """(value, decrease by the smallest steps, x, y, z) (K, 5) from each chosen pose; rows of +inf where it is −1."""
     out = np.full((chosen.size, 5), math.inf)
     for k in range(chosen.size):
         n = chosen[k]
@@ -138,13 +114,15 @@ def least_over_region(
         n = int(values.argmin())
         value, error, pose, pieces = values[n], 0.0, points[n], np.full(EIGHTHS, values[n])
     else:
-        chosen = np.concatenate(_chosen(region, points, values, 2.5 * spacing))
+        fine, coarse = _chosen(region, points, values)
+        chosen = np.concatenate([fine, np.where(coarse == fine, -1, coarse)])
         found = _polished(
             geometry, signs, region, index, points, values, chosen, 0.5 * spacing, FINEST_STEP * spacing
         )
         best = int(found[:, 0].argmin())
         value, pose = found[best, 0], found[best, 2:]
-        error = found[EIGHTHS:, 0].min() - value + found[best, 1]
+        halved = np.where(coarse == fine, found[:EIGHTHS, 0], found[EIGHTHS:, 0])
+        error = halved.min() - value + found[best, 1]
         pieces = np.where(np.isfinite(found[:EIGHTHS, 0]), found[:EIGHTHS, 0], value)
         pieces[pieces.argmin()] = value
     # shrinks with the lattice, so that a finer look at the same pose never contradicts a coarser one

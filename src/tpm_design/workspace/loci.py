@@ -23,13 +23,14 @@ from tpm_design.workspace.poses import workspace_margin
 from tpm_design.workspace.region_geometry import PlacedRegion, nearest, signed_distance
 
 CANDIDATES = 4
+APART = 0.3
 LEVELS = 200
 SLIDES = 200
 GROWTH = 1.12
 REACH_TOLERANCE = 1e-9
 FINEST_STEP = 1e-6
 ERROR_FLOOR = 1e-5
-# a slide that ends nearer to a bound of reach than this share of its first step goes on along the rim
+# a slide that ends nearer to a bound of the workspace than this share of its first step goes on along the rim
 RIM_REACH = 0.1
 RIM_STEPS = 12
 RIM_DIFFERENCE = 1e-5
@@ -250,49 +251,53 @@ def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore
 
 
 @inner
-def _nearest_leg(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """(which bound of reach is the nearest, its margin)."""
-    margins = equations.leg_margins(geometry, mode, x, y, z)
-    chosen = 0
-    for k in range(len(margins)):
-        if margins[k] < margins[chosen]:
-            chosen = k
-    return chosen, margins[chosen]
+def _bound(geometry, mode, number, x, y, z):  # type: ignore[no-untyped-def]
+    """One margin of the workspace: of the legs, then of the mode."""
+    legs = equations.leg_margins(geometry, mode, x, y, z)
+    if number < len(legs):
+        return legs[number]
+    return equations.mode_margins(geometry, mode, x, y, z)[number - len(legs)]
 
 
 @inner
-def _leg_gradient(geometry, mode, leg, x, y, z, h):  # type: ignore[no-untyped-def]
-    gx = (
-        equations.leg_margins(geometry, mode, x + h, y, z)[leg]
-        - equations.leg_margins(geometry, mode, x - h, y, z)[leg]
-    )
-    gy = (
-        equations.leg_margins(geometry, mode, x, y + h, z)[leg]
-        - equations.leg_margins(geometry, mode, x, y - h, z)[leg]
-    )
-    gz = (
-        equations.leg_margins(geometry, mode, x, y, z + h)[leg]
-        - equations.leg_margins(geometry, mode, x, y, z - h)[leg]
-    )
+def _nearest_bound(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """(number of the least margin, its value)."""
+    chosen, least, number = 0, math.inf, 0
+    for margin in equations.leg_margins(geometry, mode, x, y, z):
+        if margin < least:
+            chosen, least = number, margin
+        number += 1
+    for margin in equations.mode_margins(geometry, mode, x, y, z):
+        if margin < least:
+            chosen, least = number, margin
+        number += 1
+    return chosen, least
+
+
+@inner
+def _bound_gradient(geometry, mode, number, x, y, z, h):  # type: ignore[no-untyped-def]
+    gx = _bound(geometry, mode, number, x + h, y, z) - _bound(geometry, mode, number, x - h, y, z)
+    gy = _bound(geometry, mode, number, x, y + h, z) - _bound(geometry, mode, number, x, y - h, z)
+    gz = _bound(geometry, mode, number, x, y, z + h) - _bound(geometry, mode, number, x, y, z - h)
     return 0.5 * gx / h, 0.5 * gy / h, 0.5 * gz / h
 
 
 @inner
-def _rim_point(geometry, mode, part, leg, start, width):  # type: ignore[no-untyped-def]
-    """(found, pose, direction along the rim) where the locus meets a bound of reach, near ``start``.
+def _rim_point(geometry, mode, part, bound, start, width):  # type: ignore[no-untyped-def]
+    """(found, pose, direction along the rim) where the locus meets a bound of the workspace, near ``start``.
 
-    The determinant goes with the root of the margin inside the bound, so that the locus meets it at a
-    tangent; just outside, where the root is clamped, it is smooth, and that is where it is followed.
+    Inside the bound of a leg the determinant goes with the root of the margin, so that the locus meets it
+    at a tangent; just outside, where the root is clamped, it is smooth: that is where it is followed.
     """
     x, y, z = start
     h = RIM_DIFFERENCE * width
     for _ in range(RIM_STEPS):
         for _ in range(3):
-            nx, ny, nz = _leg_gradient(geometry, mode, leg, x, y, z, h)
+            nx, ny, nz = _bound_gradient(geometry, mode, bound, x, y, z, h)
             square = nx * nx + ny * ny + nz * nz
             if not square > 0.0:
                 return False, start, start
-            excess = equations.leg_margins(geometry, mode, x, y, z)[leg] + 0.5 * REACH_TOLERANCE
+            excess = _bound(geometry, mode, bound, x, y, z) + 0.5 * REACH_TOLERANCE
             share = excess / square
             x, y, z = x - share * nx, y - share * ny, z - share * nz
         size = math.sqrt(square)
@@ -320,10 +325,10 @@ def _rim_point(geometry, mode, part, leg, start, width):  # type: ignore[no-unty
 
 @inner
 def _slide_on_rim(geometry, mode, region, part, start, best, step, smallest):  # type: ignore[no-untyped-def]
-    """Least signed distance along the rim of the locus, from a pose of the locus near a bound of reach."""
-    leg, _ = _nearest_leg(geometry, mode, start[0], start[1], start[2])
+    """Least signed distance along the rim of the locus, from one of its poses near a bound of the workspace."""
+    bound, _ = _nearest_bound(geometry, mode, start[0], start[1], start[2])
     x, y, z = start
-    found, pose, rim = _rim_point(geometry, mode, part, leg, start, step)
+    found, pose, rim = _rim_point(geometry, mode, part, bound, start, step)
     if not found or workspace_margin(geometry, mode, pose[0], pose[1], pose[2]) < -REACH_TOLERANCE:
         return best, x, y, z
     here = signed_distance(region, pose[0], pose[1], pose[2])
@@ -338,7 +343,7 @@ def _slide_on_rim(geometry, mode, region, part, start, best, step, smallest):  #
             if abs(way) <= smallest:
                 continue
             point = (pose[0] + way * rim[0], pose[1] + way * rim[1], pose[2] + way * rim[2])
-            found, there, along = _rim_point(geometry, mode, part, leg, point, max(abs(way), step))
+            found, there, along = _rim_point(geometry, mode, part, bound, point, max(abs(way), step))
             if found and workspace_margin(geometry, mode, there[0], there[1], there[2]) >= -REACH_TOLERANCE:
                 distance = signed_distance(region, there[0], there[1], there[2])
                 if distance < here:
@@ -377,12 +382,14 @@ def _best_slide(geometry, mode, region, part, starts, distances, stride, step, s
             if not distances[n] < math.inf or (pick >= 0 and distances[n] >= distances[pick]):
                 continue
             apart = True
+            # the farther, the wider: pieces in other directions are worth more than more of the same
+            separation = max(2.0 * step, APART * distances[n])
             for j in range(k):
                 m = chosen[j]
                 square = 0.0
                 for axis in range(3):
                     square += (starts[n, axis] - starts[m, axis]) ** 2
-                apart = apart and square > 4.0 * step * step
+                apart = apart and square > separation * separation
             if apart:
                 pick = n
         if pick < 0:
@@ -391,9 +398,10 @@ def _best_slide(geometry, mode, region, part, starts, distances, stride, step, s
         start = (starts[pick, 0], starts[pick, 1], starts[pick, 2])
         found = _slide(geometry, mode, region, part, start, step, smallest)
         if found[0] < math.inf:
-            pose = (found[1], found[2], found[3])
-            if _nearest_leg(geometry, mode, pose[0], pose[1], pose[2])[1] < RIM_REACH * step:
-                found = _slide_on_rim(geometry, mode, region, part, pose, found[0], step, smallest)
+            start = (found[1], found[2], found[3])
+        # also from a start that leaves the workspace on its way to the locus
+        if _nearest_bound(geometry, mode, start[0], start[1], start[2])[1] < RIM_REACH * step:
+            found = _slide_on_rim(geometry, mode, region, part, start, found[0], step, smallest)
         if found[0] < best:
             best, bx, by, bz = found
     return best, bx, by, bz

@@ -207,6 +207,10 @@ def _cut(geometry, mode, sided, part_count, floor, origin, steps, segments, shap
     states = np.empty(part_count, np.int64)
     found = 0
     for s in range(rays.size):
+        for n in range(first[s] + 1, first[s + 1]):
+            # through both ends of the floor in order, even where the way between two samples is crooked
+            if changes[n, 1] == changes[n - 1, 1]:
+                roots[n] = max(roots[n], roots[n - 1])
         _sort(roots, changes, first[s], first[s + 1])
         for part in range(part_count):
             states[part] = _state(margins[part, s * samples], floor)

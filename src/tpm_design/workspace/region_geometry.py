@@ -70,7 +70,17 @@ def _ellipsoid_foot(half, x, y, z):  # type: ignore[no-untyped-def]
         if abs(following - t) <= 1e-16 * least or high - low <= 1e-16 * least:
             break
         t = following
-    return a * x / (a + t), b * y / (b + t), c * z / (c + t)
+    u, v, w = half[0] * x / (a + t), half[1] * y / (b + t), half[2] * z / (c + t)
+    missing = 1.0 - u * u - v * v - w * w
+    if missing > 1e-12:
+        # in the plane across the shortest axis, too deep for a root: the foot lies off the plane
+        if least == a:
+            u = math.sqrt(u * u + missing)
+        elif least == b:
+            v = math.sqrt(v * v + missing)
+        else:
+            w = math.sqrt(w * w + missing)
+    return half[0] * u, half[1] * v, half[2] * w
 
 
 @inner

@@ -1,0 +1,124 @@
+"""The documentation says what is there: commands, options, links, examples and numbers."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+import tpm_design as tpm
+from tpm_design.cli.app import app
+from tpm_design.mechanisms import MECHANISMS
+from tpm_design.metrics import METRICS
+from tpm_design.optimizers import OPTIMIZERS
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+CODE = re.compile(r"```[a-z]*\n(.*?)```|`([^`\n]+)`", re.DOTALL)
+COMMAND = re.compile(r"(?<![\w-])tpm-design ([a-z]+)([^\n&]*)")
+OPTION = re.compile(r"--[a-z-]+")
+LINK = re.compile(r"\[[^\]]*\]\(([^)#\s]+)(?:#[^)]*)?\)")
+
+
+def options() -> dict[str, set[str]]:
+    """Command → its options, as the program has them."""
+    group = typer.main.get_command(app)
+    assert hasattr(group, "commands")
+    return {
+        name: {option for parameter in command.params for option in parameter.opts if option.startswith("--")}
+        for name, command in group.commands.items()
+    }
+
+
+def code_of(text: str) -> list[str]:
+    return [fenced or inline for fenced, inline in CODE.findall(text)]
+
+
+def blocks(language: str) -> list[str]:
+    """Fenced blocks of the README in one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
+def test_commands_and_options_that_are_named_exist(page: Path) -> None:
+    known = options()
+    for code in code_of(page.read_text(encoding="utf-8")):
+        for name, rest in COMMAND.findall(code):
+            assert name in known
+            assert set(OPTION.findall(rest)) <= known[name] | {"--help"}
+
+
+def test_the_table_of_commands_is_complete() -> None:
+    table = {
+        name: set(OPTION.findall(rest))
+        for name, rest in re.findall(r"^\| `tpm-design ([a-z]+)([^`]*)` \|", README, re.MULTILINE)
+    }
+    assert table == options()
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "results" / "README.md"], ids=lambda path: str(path.name))
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in LINK.findall(page.read_text(encoding="utf-8")):
+        assert target.startswith("https://") or (page.parent / target).exists(), target
+
+
+def test_the_main_command_is_one_line_that_runs_a_valid_study() -> None:
+    main, test = blocks("sh")
+    for command in (main, test):
+        assert command.count("\n") == 1
+        assert command.startswith("python3 -m venv .venv")
+    (study,) = re.findall(r"tpm-design optimize (\S+)", main)
+    assert tpm.load_study(ROOT / study).problem.variables
+
+
+def test_continuous_integration_runs_the_test_command_of_the_readme(tmp_path: Path) -> None:
+    """The script as it is, where the command it reads out is `echo`."""
+    (tmp_path / ".ci").mkdir()
+    script = tmp_path / ".ci" / "run"
+    script.write_bytes((ROOT / ".ci" / "run").read_bytes())
+    script.chmod(0o755)
+    command = blocks("sh")[1]
+    (tmp_path / "README.md").write_text(README.replace(command, f"echo '{command.strip()}'\n".replace("'.[test]'", ".[test]")), encoding="utf-8")
+    done = subprocess.run([script], capture_output=True, text=True, check=True)
+    assert done.stdout == command.replace("'.[test]'", ".[test]")
+
+
+def test_the_study_shown_is_the_study_there_is() -> None:
+    (shown,) = blocks("yaml")
+    study = " ".join(line.split("#")[0].strip() for line in (ROOT / "studies/01-uru-cube.yaml").read_text(encoding="utf-8").splitlines())
+    for line in shown.splitlines():
+        assert line.split("#")[0].strip() in study
+
+
+def test_the_python_example_runs() -> None:
+    (example,) = blocks("python")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", example], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "of 100 evaluations" in done.stdout or "in 100 evaluations" in done.stdout
+
+
+def test_the_numbers_shown_are_those_of_the_design_shown() -> None:
+    """To the digits of the table; the design itself is given to six."""
+    (shown,) = blocks("text")
+    rows = {line.split()[0]: line.split()[1:] for line in shown.splitlines() if line.strip()}
+    design = {name: float(rows[name][0]) / 1000.0 for name in ("db", "dp", "f", "r", "center_x", "center_y", "center_z")}
+    study = tpm.load_study(ROOT / "studies" / "01-uru-cube.yaml")
+    found = study.evaluate(design | {"k": float(rows["k"][0])})
+    for label, value in found.metrics.items():
+        scale = 1000.0 if rows[label][1] == "mm" else 1.0
+        assert scale * value == pytest.approx(float(rows[label][0]), rel=1e-3)
+
+
+def test_names_in_code_are_registered() -> None:
+    """Whatever looks like a metric or a method in the README's study and output is one."""
+    names = re.findall(r"(?:metric|method|polish|type): ([a-z_.]+)", README)
+    known = {*METRICS, *OPTIMIZERS, *MECHANISMS, "box"}
+    assert names
+    assert set(names) <= known
