@@ -83,14 +83,20 @@ def test_continuous_integration_runs_the_test_command_of_the_readme(tmp_path: Pa
     script.write_bytes((ROOT / ".ci" / "run").read_bytes())
     script.chmod(0o755)
     command = blocks("sh")[1]
-    (tmp_path / "README.md").write_text(README.replace(command, f"echo '{command.strip()}'\n".replace("'.[test]'", ".[test]")), encoding="utf-8")
+    (tmp_path / "README.md").write_text(
+        README.replace(command, f"echo '{command.strip()}'\n".replace("'.[test]'", ".[test]")),
+        encoding="utf-8",
+    )
     done = subprocess.run([script], capture_output=True, text=True, check=True)
     assert done.stdout == command.replace("'.[test]'", ".[test]")
 
 
 def test_the_study_shown_is_the_study_there_is() -> None:
     (shown,) = blocks("yaml")
-    study = " ".join(line.split("#")[0].strip() for line in (ROOT / "studies/01-uru-cube.yaml").read_text(encoding="utf-8").splitlines())
+    study = " ".join(
+        line.split("#")[0].strip()
+        for line in (ROOT / "studies/01-uru-cube.yaml").read_text(encoding="utf-8").splitlines()
+    )
     for line in shown.splitlines():
         assert line.split("#")[0].strip() in study
 
@@ -108,7 +114,10 @@ def test_the_numbers_shown_are_those_of_the_design_shown() -> None:
     """To the digits of the table; the design itself is given to six."""
     (shown,) = blocks("text")
     rows = {line.split()[0]: line.split()[1:] for line in shown.splitlines() if line.strip()}
-    design = {name: float(rows[name][0]) / 1000.0 for name in ("db", "dp", "f", "r", "center_x", "center_y", "center_z")}
+    design = {
+        name: float(rows[name][0]) / 1000.0
+        for name in ("db", "dp", "f", "r", "center_x", "center_y", "center_z")
+    }
     study = tpm.load_study(ROOT / "studies" / "01-uru-cube.yaml")
     found = study.evaluate(design | {"k": float(rows["k"][0])})
     for label, value in found.metrics.items():

@@ -118,7 +118,8 @@ def test_the_nearest_point(name: str, offset: tuple[float, float, float]) -> Non
     assert distances(region, foot)[0] <= 1e-12
     assert np.linalg.norm(foot - pose) == pytest.approx(max(0.0, distance), abs=1e-12)
     if name == "points":
-        assert distance == min(math.dist(pose[0], point) for point in region.points)
+        closest = min(math.dist(pose[0], point) for point in region.points)
+        assert distance == pytest.approx(closest, abs=1e-12)
 
 
 @settings(max_examples=80, deadline=None, derandomize=True)
@@ -127,7 +128,9 @@ def test_the_nearest_point(name: str, offset: tuple[float, float, float]) -> Non
     st.tuples(coordinates, coordinates, coordinates),
     st.tuples(coordinates, coordinates, coordinates),
 )
-def test_signed_distances_of_convex_regions(name: str, one: tuple[float, ...], two: tuple[float, ...]) -> None:
+def test_signed_distances_of_convex_regions(
+    name: str, one: tuple[float, ...], two: tuple[float, ...]
+) -> None:
     """A convex region's signed distance is convex and changes no faster than the pose."""
     region = place(SHAPES[name], CENTRE)
     a, b = np.array(one) + CENTRE, np.array(two) + CENTRE
@@ -201,8 +204,7 @@ def test_feelers_leave_no_gap(name: str) -> None:
     poses, reach = poses[reach > 0.0], reach[reach > 0.0]
     bases, normals = feelers(region, 7)
     gaps = [
-        np.linalg.norm(bases + d * normals - pose, axis=1).min()
-        for d, pose in zip(reach, poses, strict=True)
+        np.linalg.norm(bases + d * normals - pose, axis=1).min() for d, pose in zip(reach, poses, strict=True)
     ]
     # half a cell's diagonal on the surface, and as much of the fan of normals
     cell = 2.0 * max(region.half) / 6 if name != "points" else 0.0

@@ -17,7 +17,7 @@ LOCAL_STEP = 0.05
 """First step of local methods, as a share of each variable's range: chosen on constrained problems in seven
 variables, where it finished the result of a global search best (0.01 to 0.1 differ little)."""
 
-LOCAL_TOLERANCE = 1e-8
+LOCAL_TOLERANCE = 1e-6
 """Step, as a share of each variable's range, below which a local method has converged."""
 
 DIFFERENCE_STEP = 1e-5

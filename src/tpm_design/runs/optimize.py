@@ -16,10 +16,10 @@ POLISH_SHARE = 0.25
 """Part of the budget kept for polishing. The whole-space search does not know it: a larger budget lets the
 same path go on."""
 
-POLISH_NEIGHBOURHOODS = (0.05, 0.02, 0.01)
+POLISH_NEIGHBOURHOODS = (0.1, 0.03)
 """Half widths of the neighbourhoods that are polished, as shares of each range."""
 
-POLISH_ROUND = 40
+POLISH_ROUND = 20
 """Evaluations per variable in one neighbourhood."""
 
 POLISH_GAIN = 1e-4

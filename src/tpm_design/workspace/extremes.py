@@ -86,7 +86,8 @@ def _chosen(region, points, values):  # type: ignore[no-untyped-def]
 
 @kernel
 def _polished(geometry, mode, region, index, points, values, chosen, step, smallest):  # type: ignore[no-untyped-def]
-    """(value, decrease by the smallest steps, x, y, z) (K, 5) from each chosen pose; rows of +inf where it is −1."""
+    """(value, decrease by the smallest steps, x, y, z) (K, 5) from each chosen pose; rows of +inf where
+    it is −1."""
     out = np.full((chosen.size, 5), math.inf)
     for k in range(chosen.size):
         n = chosen[k]

@@ -192,8 +192,9 @@ def _try(geometry, mode, region, part, point, normal, width, best):  # type: ign
 def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore[no-untyped-def]
     """Least signed distance along the locus from ``start``: (distance, x, y, z).
 
-    First the full step to the foot of the nearest region point in the tangent plane, then a compass in
-    it that turns after each failure, so that no edge of the reach stops it for good.
+    First the full step to the foot of the nearest region point (inside the region: of its centre) in the
+    tangent plane, then a compass in it that turns after each failure, so that no edge of the reach stops it
+    for good.
     """
     x, y, z = start
     turn, failures = 0.0, 0
@@ -212,12 +213,13 @@ def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore
         if not size > 0.0:
             break
         normal = (gx / size, gy / size, gz / size)
-        u = nearest(region, x, y, z)
+        outside = best > 0.0
+        u = nearest(region, x, y, z) if outside else region.centre
         dx, dy, dz = u[0] - x, u[1] - y, u[2] - z
         along = dx * normal[0] + dy * normal[1] + dz * normal[2]
         dx, dy, dz = dx - along * normal[0], dy - along * normal[1], dz - along * normal[2]
         way = math.sqrt(dx * dx + dy * dy + dz * dz)
-        if way <= smallest:
+        if outside and way <= smallest:
             # the nearest region point lies along the normal: stationary
             break
         trial = _try(geometry, mode, region, part, (x + dx, y + dy, z + dz), normal, max(way, step), best)

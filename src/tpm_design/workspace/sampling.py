@@ -54,7 +54,9 @@ def feelers(region: PlacedRegion, samples: int) -> tuple[FloatArray, FloatArray]
     if region.form == CYLINDER:
         points, normals = _cylinder_feelers(samples)
         return centre + half * points, normals
-    normals = _sphere(max(3, samples // 2))
+    # between even normals and even points: both matter on a flat ellipsoid
+    normals = _sphere(max(3, samples // 2)) / np.sqrt(half)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     support = half * half * normals
     return centre + support / np.sqrt((support * normals).sum(axis=1, keepdims=True)), normals
 
