@@ -162,7 +162,7 @@ def test_every_parameter_stands_in_the_table_with_its_range(run_folder: Path) ->
     rows = rows_of((run_folder / "report.md").read_text(encoding="utf-8"))
     _, value, unit, searched, meaning = rows["`f`"]
     assert math.isclose(float(value) / 1000.0, float(reported.best.evaluation.design["f"]), rel_tol=1e-5)
-    assert (unit, searched) == ("mm", "220 … 420")
+    assert (unit, searched) == ("mm", "220 … 420 mm")
     assert "proximal link" in meaning
     assert rows["`db`"][1:4] == ["250", "mm", "fixed"]
     assert rows["`k`"][1:4] == ["1", "–", "fixed"]

@@ -163,7 +163,7 @@ def test_evaluate_prints_units_errors_and_slacks(tmp_path: Path) -> None:
     rows = {line.split()[0]: line for line in lines if line}
     assert "1500 mm" in rows["total_link_length"]
     assert "± 0" in rows["total_link_length"]
-    assert "minimize" in rows["total_link_length"]
+    assert "minimise" in rows["total_link_length"]
     assert "≥ 20 mm" in rows["rotation_singularity_distance"]
     assert "met by" in rows["coverage"]
     assert lines[-1].startswith("This design is feasible")

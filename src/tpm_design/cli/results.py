@@ -8,7 +8,8 @@ from typing import Any
 
 from tpm_design.cli.text import table
 from tpm_design.problem import Evaluation, Goal, Problem
-from tpm_design.runs.optimize import binding
+from tpm_design.report.readings import at_end, limiting, nearest_constraint
+from tpm_design.report.words import asked, range_text
 from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import goal_unit, parameter_columns
 from tpm_design.units import Units
@@ -23,17 +24,7 @@ def design_rows(problem: Problem, units: Units, evaluation: Evaluation) -> list[
     for column in parameter_columns(problem, units):
         value = evaluation.design[column.name]
         text = value if isinstance(value, str) else units.written(value, column.unit)
-        variable = ranges.get(column.name)
-        if variable is None:
-            searched = "fixed"
-        elif variable.values:
-            searched = "one of " + ", ".join(
-                v if isinstance(v, str) else units.written(v, column.unit) for v in variable.values
-            )
-        else:
-            low, high = units.written(variable.lower, column.unit), units.written(variable.upper, column.unit)
-            searched = f"{low} … {high}"
-        rows.append([column.name, text, searched])
+        rows.append([column.name, text, range_text(ranges.get(column.name), units)])
     return rows
 
 
@@ -65,18 +56,6 @@ def error_text(units: Units, error: float, unit: str) -> str:
     return "0" if error == 0.0 else units.written(error, unit, digits=2)
 
 
-def asked(goal: Goal, units: Units, unit: str) -> str:
-    """What the study asks of a metric."""
-    if goal.sense is not None:
-        return goal.sense
-    bounds = []
-    if goal.minimum is not None:
-        bounds.append(f"≥ {units.written(goal.minimum, unit)}")
-    if goal.maximum is not None:
-        bounds.append(f"≤ {units.written(goal.maximum, unit)}")
-    return " and ".join(bounds) or "recorded"
-
-
 def _slack_text(problem: Problem, units: Units, evaluation: Evaluation, goal: Goal, unit: str) -> str:
     if goal.label not in evaluation.slacks:
         return ""
@@ -97,37 +76,23 @@ def result_text(problem: Problem, units: Units, evaluation: Evaluation) -> str:
 
 
 def limit_text(problem: Problem, entry: Entry) -> str:
-    """What limits a design: the constraints within a hundredth of their scale of their bound, or the least
-    slack."""
-    found = binding(problem, entry)
-    if found is None:
-        return "No constraint limits the design."
-    close = [
-        goal.label
-        for goal in problem.constraints
-        if abs(entry.evaluation.slacks.get(goal.label, math.inf)) <= 0.01 * goal.metric.scale
-    ]
-    edges = _at_bounds(problem, entry.evaluation)
+    """What limits a design: constraints at their bound and ranges at their end, else the nearest bound."""
+    missed = [label for label, slack in entry.evaluation.slacks.items() if slack < 0.0]
+    if missed:
+        return f"Misses {', '.join(missed)}."
+    labels = [goal.label for goal in limiting(problem, entry)]
+    ends = [variable.name for variable in at_end(problem, entry.evaluation)]
     parts = []
-    if close:
-        parts.append("constraints at their bound: " + ", ".join(close))
-    if edges:
-        parts.append("ranges at their end: " + ", ".join(edges))
-    if not parts:
-        parts.append(f"nothing binds; the nearest constraint is {found[0].label}")
-    return "Limited by " + "; ".join(parts) + "." if close or edges else parts[0].capitalize() + "."
-
-
-def _at_bounds(problem: Problem, evaluation: Evaluation) -> list[str]:
-    names = []
-    for variable in problem.variables:
-        if variable.values:
-            continue
-        value, width = abs(float(evaluation.design[variable.name])), variable.upper - variable.lower
-        signed = value if variable.mirrored else float(evaluation.design[variable.name])
-        if min(signed - variable.lower, variable.upper - signed) <= 1e-6 * width:
-            names.append(variable.name)
-    return names
+    if labels:
+        parts.append("constraints at their bound: " + ", ".join(labels))
+    if ends:
+        parts.append("ranges at their end: " + ", ".join(ends))
+    if parts:
+        return f"Limited by {'; '.join(parts)}."
+    nearest = nearest_constraint(problem, entry)
+    if nearest is None:
+        return "No constraint limits the design."
+    return f"Nothing binds; the nearest constraint is {nearest.goal.label}."
 
 
 def evaluation_data(problem: Problem, units: Units, evaluation: Evaluation) -> dict[str, Any]:

@@ -1,5 +1,16 @@
-"""Reports: what a run found, as text and figures in its folder."""
+"""What a run says to people: report.md and figures."""
 
-from tpm_design.report.write import write_report
+from __future__ import annotations
 
-__all__ = ["write_report"]
+from pathlib import Path
+
+
+def write_report(folder: Path) -> tuple[Path, ...]:
+    """Writes report.md and figures/*.png into a run folder; returns their paths.
+
+    Raises UsageError for a folder that is no run or cannot be written, StudyError for its study.
+    """
+    # drawing libraries load slowly and the command line shares the words of this room
+    from tpm_design.report.write import write_report as write
+
+    return write(folder)

@@ -76,13 +76,15 @@ def range_text(variable: Variable | None, units: Units) -> str:
     if variable is None:
         return "fixed"
     unit = si_unit(variable.dimension)
+    name = "" if unit == "-" else f" {units.name(unit)}"
     if len(variable.values) > MOST_LISTED:
         return f"one of {len(variable.values)}"
     if variable.values:
-        return "one of " + ", ".join(
+        listed = ", ".join(
             value if isinstance(value, str) else f"{units.from_si(value, unit):.6g}"
             for value in variable.values
         )
+        return f"one of {listed}{name}"
     low, high = units.from_si(variable.lower, unit), units.from_si(variable.upper, unit)
     side = ", on the octant's side" if variable.mirrored else ""
-    return f"{low:.6g} … {high:.6g}{side}"
+    return f"{low:.6g} … {high:.6g}{name}{side}"

@@ -26,6 +26,7 @@ CANDIDATES = 4
 APART = 0.3
 LEVELS = 200
 SLIDES = 200
+LONGEST_STEP = 10.0
 GROWTH = 1.12
 REACH_TOLERANCE = 1e-9
 FINEST_STEP = 1e-6
@@ -192,12 +193,16 @@ def _try(geometry, mode, region, part, point, normal, width, best):  # type: ign
 def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore[no-untyped-def]
     """Least signed distance along the locus from ``start``: (distance, x, y, z).
 
-    First the full step to the foot of the nearest region point (inside the region: of its centre) in the
-    tangent plane, then a compass in it that turns after each failure, so that no edge of the reach stops it
-    for good.
+    First a step in the tangent plane towards the foot of the nearest region point (inside the region: of its
+    centre), as long as the last two feet suggest (J. Barzilai, J. Borwein, Two-point step size gradient
+    methods, IMA J. Numer. Anal. 8, 1988), then a compass in it that turns after each failure, so that no
+    edge of the reach stops it for good.
     """
     x, y, z = start
     turn, failures = 0.0, 0
+    wanted = 1e-8 * step
+    stepped = False
+    px, py, pz, qx, qy, qz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     difference = 1e-6 * step
     gx, gy, gz, size = _gradient(geometry, mode, part, x, y, z, difference)
     if not size > 0.0:
@@ -213,7 +218,7 @@ def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore
         if not size > 0.0:
             break
         normal = (gx / size, gy / size, gz / size)
-        outside = best > 0.0
+        outside = best > smallest
         u = nearest(region, x, y, z) if outside else region.centre
         dx, dy, dz = u[0] - x, u[1] - y, u[2] - z
         along = dx * normal[0] + dy * normal[1] + dz * normal[2]
@@ -222,8 +227,20 @@ def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore
         if outside and way <= smallest:
             # the nearest region point lies along the normal: stationary
             break
-        trial = _try(geometry, mode, region, part, (x + dx, y + dy, z + dz), normal, max(way, step), best)
+        length = 1.0
+        if stepped:
+            sx, sy, sz = x - px, y - py, z - pz
+            change = sx * (qx - dx) + sy * (qy - dy) + sz * (qz - dz)
+            if change > 0.0:
+                length = min(LONGEST_STEP, max(1.0 / LONGEST_STEP, (sx * sx + sy * sy + sz * sz) / change))
+        px, py, pz, qx, qy, qz = x, y, z, dx, dy, dz
+        point = (x + length * dx, y + length * dy, z + length * dz)
+        trial = _try(geometry, mode, region, part, point, normal, max(length * way, step), best)
+        if not trial[0] < best and length != 1.0:
+            point = (x + dx, y + dy, z + dz)
+            trial = _try(geometry, mode, region, part, point, normal, max(way, step), best)
         moved = trial[0] < best
+        stepped = moved
         if not moved:
             ax, ay, az = _perpendicular(normal)
             bx = normal[1] * az - normal[2] * ay
@@ -241,7 +258,7 @@ def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore
             gain = best - trial[0]
             best, x, y, z = trial
             failures = 0
-            if gain < 1e-4 * step:
+            if gain < (wanted if stepped else 1e-4 * step):
                 failures = 2
         else:
             failures += 1
