@@ -200,7 +200,7 @@ def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore
     """
     x, y, z = start
     turn, failures = 0.0, 0
-    wanted = 1e-8 * step
+    wanted, touching = 1e-8 * step, ERROR_FLOOR * step
     stepped = False
     px, py, pz, qx, qy, qz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     difference = 1e-6 * step
@@ -218,7 +218,7 @@ def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore
         if not size > 0.0:
             break
         normal = (gx / size, gy / size, gz / size)
-        outside = best > smallest
+        outside = best > touching
         u = nearest(region, x, y, z) if outside else region.centre
         dx, dy, dz = u[0] - x, u[1] - y, u[2] - z
         along = dx * normal[0] + dy * normal[1] + dz * normal[2]

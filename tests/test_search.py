@@ -1,0 +1,148 @@
+"""The search driver on real problems: what it promises about budgets, results and the best design."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tpm_design.design_space import DesignSpace, octant_signs
+from tpm_design.errors import RefusedError
+from tpm_design.optimizers.base import BudgetSpent
+from tpm_design.problem import Accuracy, Problem, Variable, evaluate
+from tpm_design.runs.optimize import SearchPlan, SearchResult, search
+from tpm_design.runs.search import EvaluationLog, UnitSearch
+from tpm_design.study import load_study
+
+STUDIES = Path(__file__).parents[1] / "studies"
+
+
+@pytest.fixture(scope="module")
+def cube() -> Problem:
+    return replace(load_study(STUDIES / "01-uru-cube.yaml").problem, record=())
+
+
+def run(problem: Problem, plan: SearchPlan, workers: int = 2) -> SearchResult:
+    return search(problem, plan, workers=workers, record=lambda entry: None)
+
+
+@pytest.fixture(scope="module")
+def found(cube: Problem) -> SearchResult:
+    return run(cube, SearchPlan("scipy.differential_evolution", 1200, 4, "scipy.cobyla"))
+
+
+def test_the_best_design_stays_feasible_at_ten_times_the_resolution(
+    cube: Problem, found: SearchResult
+) -> None:
+    assert found.best is not None
+    assert found.best.evaluation.status == "feasible"
+    finer = replace(cube, accuracy=Accuracy(1e-4, 90))
+    again = evaluate(finer, found.best.evaluation.design)
+    assert again.status == "feasible", again.reason
+    for label, value in found.best.evaluation.metrics.items():
+        error = found.best.evaluation.errors[label] + again.errors[label]
+        assert abs(again.metrics[label] - value) <= error + 1e-12
+
+
+def test_no_feasible_design_is_shorter_than_the_convex_bound(found: SearchResult) -> None:
+    """A cube of edge a kept μ off the coordinate planes: f + r ≥ √(a²/4 + 2 (a + μ)²) for any offset δ."""
+    bound = math.sqrt(0.2**2 / 4.0 + 2.0 * 0.22**2)
+    assert bound == pytest.approx(0.326803, abs=1e-6)
+    feasible = [e.evaluation for e in found.entries if e.evaluation.status == "feasible"]
+    assert len(feasible) > 50
+    for evaluation in feasible:
+        assert float(evaluation.design["f"]) + float(evaluation.design["r"]) >= bound
+
+
+def test_the_result_is_the_best_feasible_entry_of_the_log(found: SearchResult) -> None:
+    assert found.best is not None
+    feasible = [e for e in found.entries if e.evaluation.status == "feasible"]
+    least = min(e.evaluation.metrics["total_link_length"] for e in feasible)
+    assert found.best.evaluation.metrics["total_link_length"] == least
+    assert [e.number for e in found.entries] == list(range(len(found.entries)))
+
+
+def test_a_larger_budget_goes_on_where_a_smaller_one_ended(cube: Problem) -> None:
+    short, long = (run(cube, SearchPlan("scipy.differential_evolution", n, 3, None)) for n in (60, 120))
+    assert len(short.entries) == 60
+    assert len(long.entries) == 120
+    assert [e.evaluation.design for e in long.entries[:60]] == [e.evaluation.design for e in short.entries]
+
+
+def test_repeated_designs_cost_nothing_and_the_budget_is_exact(cube: Problem) -> None:
+    space = DesignSpace(cube.variables, cube.fixed, octant_signs(cube.modes))
+    log = EvaluationLog(cube, workers=1)
+    view = UnitSearch(log, space, space.start(), 3, (1,) * len(cube.constraints))
+    points = np.random.default_rng(0).random((2, view.dimension))
+    first = view.evaluate(points)
+    again = view.evaluate(points)
+    assert len(log.entries) == 2
+    assert np.array_equal(first.merit, again.merit)
+    with pytest.raises(BudgetSpent):
+        view.evaluate(np.random.default_rng(1).random((4, view.dimension)))
+    assert len(log.entries) == 3
+
+
+def test_optimisers_see_finite_numbers_everywhere(cube: Problem) -> None:
+    space = DesignSpace(cube.variables, cube.fixed, octant_signs(cube.modes))
+    sizes = (32, 8, 1, 1)
+    view = UnitSearch(EvaluationLog(cube, workers=1), space, space.start(), 100, sizes)
+    outcome = view.evaluate(np.random.default_rng(2).random((60, view.dimension)))
+    assert outcome.constraints.shape == (60, sum(sizes))
+    for values in (outcome.objective, outcome.constraints, outcome.merit):
+        assert np.isfinite(values).all()
+
+
+def test_points_and_designs_are_inverse(cube: Problem) -> None:
+    space = DesignSpace(cube.variables, cube.fixed, octant_signs(cube.modes))
+    for point in np.random.default_rng(3).random((50, len(space.variables))):
+        design = space.design(point)
+        assert space.design(space.point(design)) == pytest.approx(design)
+        near = space.near(design, 0.01)
+        for original, variable in zip(space.variables, near.variables, strict=True):
+            if not variable.values:
+                assert original.lower <= variable.lower <= float(design[variable.name]) + 1e-12
+                assert float(design[variable.name]) - 1e-12 <= variable.upper <= original.upper
+
+
+def test_a_mirrored_centre_takes_the_side_of_the_octant() -> None:
+    modes = {"a": {"octant": "+-+", "elbows": "+++"}, "b": {"octant": "---", "elbows": "+++"}}
+    variables = (
+        *(Variable(f"center_{axis}", "length", 0.0, 1.0, mirrored=True) for axis in "xyz"),
+        Variable("mode", "mode", values=("a", "b")),
+    )
+    space = DesignSpace(variables, {}, octant_signs(modes))
+    first, second = (space.design(np.array([0.2, 0.4, 0.6, mode])) for mode in (0.1, 0.9))
+    assert [first[f"center_{axis}"] for axis in "xyz"] == pytest.approx([0.2, -0.4, 0.6])
+    assert [second[f"center_{axis}"] for axis in "xyz"] == pytest.approx([-0.2, -0.4, -0.6])
+    assert space.point(second)[:3] == pytest.approx([0.2, 0.4, 0.6])
+
+
+def test_every_working_mode_can_be_searched(tmp_path: Path) -> None:
+    text = (STUDIES / "01-uru-cube.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "best.yaml"
+    path.write_text(text.replace('{octant: "+++", elbows: "+++"}', "best"), encoding="utf-8")
+    study = load_study(path)
+    result = study.optimize(budget=80, seed=2)
+    used = {entry.evaluation.design["mode"] for entry in result.result.entries}
+    assert len(study.problem.modes) == 24
+    assert len(used) > 8
+    for entry in result.result.entries:
+        octant = study.problem.modes[str(entry.evaluation.design["mode"])]["octant"]
+        for axis, sign in zip("xyz", octant, strict=True):
+            assert float(entry.evaluation.design[f"center_{axis}"]) * (1 if sign == "+" else -1) >= 0.0
+
+
+def test_what_cannot_work_is_refused_before_anything_runs(cube: Problem) -> None:
+    for method, words in (("nlopt.mma", "discrete"), ("nlopt.cobyla", "discrete")):
+        with pytest.raises(RefusedError, match=words):
+            run(cube, SearchPlan(method, 10, 1, None))
+    with pytest.raises(RefusedError, match="polish"):
+        run(cube, SearchPlan("scipy.differential_evolution", 10, 1, "nlopt.isres"))
+    with pytest.raises(RefusedError, match="objective"):
+        run(replace(cube, objectives=cube.objectives * 2), SearchPlan("nlopt.isres", 10, 1, None))
+    with pytest.raises(RefusedError, match="free"):
+        run(replace(cube, variables=()), SearchPlan("nlopt.isres", 10, 1, None))
