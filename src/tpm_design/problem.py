@@ -65,7 +65,7 @@ class Accuracy:
 
 @dataclass(frozen=True)
 class Problem:
-    """What a study asks. ``modes``: label → sign strings, e.g. ``{"+++ +-+": {"octant": …, "elbows": …}}``."""
+    """What a study asks. ``modes``: label → sign strings, ``{"+++ +-+": {"octant": …, "elbows": …}}``."""
 
     kind: MechanismKind
     fixed: Mapping[str, float | str]

@@ -19,7 +19,13 @@ def random_parameters(random: np.random.Generator) -> dict[str, Any]:
     """Equal limbs half of the time."""
     if random.random() < 0.5:
         f, r = random.uniform(0.4, 1.0, 2)
-        return {"db": random.uniform(0.0, 0.4), "dp": 0.06, "f": f, "r": r, "k": random.choice([0.5, 1.0, 2.0])}
+        return {
+            "db": random.uniform(0.0, 0.4),
+            "dp": 0.06,
+            "f": f,
+            "r": r,
+            "k": random.choice([0.5, 1.0, 2.0]),
+        }
     return {
         "db": tuple(random.uniform(0.0, 0.4, 3)),
         "dp": tuple(random.uniform(0.0, 0.3, 3)),

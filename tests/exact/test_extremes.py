@@ -86,9 +86,6 @@ def test_extremes_over_points() -> None:
     points = np.array(offsets) + context.placed.centre
     for index in INDICES.values():
         values = index_values(context.mechanism.geometry, context.mode.signs, index, points)
-        found = least_over_region(
-            context.mechanism.geometry, context.mode.signs, region, index, points, 0.01
-        )
+        found = least_over_region(context.mechanism.geometry, context.mode.signs, region, index, points, 0.01)
         assert found.value == index.sign * values.min()
         assert found.error <= 1e-10 * abs(found.value)
-

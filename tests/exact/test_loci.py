@@ -36,7 +36,9 @@ def measured(context: Context, name: str) -> Measurement:
     return METRICS[f"{name}_singularity_distance"].compute(context, {})
 
 
-def ball_context(shape: Shape, centre: tuple[float, float, float], octant: str = "+++", **change: float) -> Context:
+def ball_context(
+    shape: Shape, centre: tuple[float, float, float], octant: str = "+++", **change: float
+) -> Context:
     built = mechanism("uru", **(BALL | change))
     return Context(built, built.mode_of({"octant": octant, "elbows": "+++"}), place(shape, centre), 1e-3, 9)
 

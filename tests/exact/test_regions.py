@@ -143,9 +143,13 @@ def test_distances_in_closed_form() -> None:
     box, ball = place(Box((0.4, 0.2, 0.6)), CENTRE), place(Sphere(0.2), CENTRE)
     tube, egg = place(Cylinder(0.25, 0.3), CENTRE), place(Ellipsoid((1.0, 0.5, 0.2)), (0.0, 0.0, 0.0))
     assert distances(box, np.array([CENTRE])) == pytest.approx([-0.1])
-    assert distances(box, np.array([CENTRE]) + [0.5, 0.5, 0.7]) == pytest.approx([math.hypot(0.3, 0.4, 0.4)])
-    assert distances(ball, np.array([CENTRE]) + [0.0, 0.3, 0.4]) == pytest.approx([0.3])
-    assert distances(tube, np.array([CENTRE]) + [0.33, 0.44, 0.55]) == pytest.approx([math.hypot(0.3, 0.4)])
+    assert distances(box, np.array([CENTRE]) + np.array([0.5, 0.5, 0.7])) == pytest.approx(
+        [math.hypot(0.3, 0.4, 0.4)]
+    )
+    assert distances(ball, np.array([CENTRE]) + np.array([0.0, 0.3, 0.4])) == pytest.approx([0.3])
+    assert distances(tube, np.array([CENTRE]) + np.array([0.33, 0.44, 0.55])) == pytest.approx(
+        [math.hypot(0.3, 0.4)]
+    )
     assert distances(egg, np.zeros((1, 3))) == pytest.approx([-0.2])
     # deep on the long axis the nearest surface is off the axis: x = 0.3/(1 − 0.04), z = 0.2 √(1 − x²)
     x = 0.3 / 0.96

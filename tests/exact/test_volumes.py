@@ -67,7 +67,9 @@ def test_ball_and_octant() -> None:
 
 @pytest.mark.parametrize("kind", ["reachable", "singularity_free"])
 def test_scaling(kind: VolumeKind) -> None:
-    scaled = {name: value if name == "k" else tuple(np.multiply(3.7, value)) for name, value in UNEQUAL.items()}
+    scaled = {
+        name: value if name == "k" else tuple(np.multiply(3.7, value)) for name, value in UNEQUAL.items()
+    }
     one, many = (volume_at(*machine(p, elbows="+-+"), kind, 0.05, 9).value for p in (UNEQUAL, scaled))
     assert many == pytest.approx(3.7**3 * one, rel=1e-8)
     assert one > 0.0
@@ -149,7 +151,9 @@ def test_volumes_are_smooth_in_the_design(kind: VolumeKind, change: dict[str, fl
     start = {"db": 0.15, "dp": 0.06, "f": 0.55, "r": 0.45, "k": 1.0}
 
     def along(t: float) -> float:
-        return volume_at(*machine({n: v + t * change.get(n, 0.0) for n, v in start.items()}), kind, 0.0, 8).value
+        return volume_at(
+            *machine({n: v + t * change.get(n, 0.0) for n, v in start.items()}), kind, 0.0, 8
+        ).value
 
     wide, middle, narrow = ((along(h) - along(-h)) / (2.0 * h) for h in (2e-2, 1e-2, 5e-3))
     assert middle == pytest.approx(narrow, rel=1e-3)
@@ -163,7 +167,9 @@ def test_home_chooses_the_aspect() -> None:
     random = np.random.default_rng(3)
     poses = random.uniform(0.0, 1.8, (200_000, 3))
     margins = built.margins(poses, mode)
-    code = np.where(margins["reach"] >= 0.0, 1 + (margins["translation"] > 0) + 2 * (margins["actuation"] > 0), 0)
+    code = np.where(
+        margins["reach"] >= 0.0, 1 + (margins["translation"] > 0) + 2 * (margins["actuation"] > 0), 0
+    )
     counts = np.bincount(code, minlength=5)
     cell = 1.8**3 / len(poses)
     context = Context(built, mode, None, 1e-4, 9)

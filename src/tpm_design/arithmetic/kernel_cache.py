@@ -1,9 +1,9 @@
 """Where compiled kernels are kept between runs.
 
 Numba recompiles a cached function when its own file changes, not when a formula it calls in another file
-does. So the cache folder is named by a hash of every source file of the rooms that hold compiled code: any change
-there gives a fresh folder. Numba reads its cache folder from the environment once, when it is imported; this module must
-therefore be imported before Numba and imports nothing of it.
+does. So the cache folder is named by a hash of every source file of the rooms that hold compiled code: any
+change there gives a fresh folder. Numba reads its cache folder from the environment once, when it is
+imported; this module must therefore be imported before Numba and imports nothing of it.
 """
 
 from __future__ import annotations

@@ -101,10 +101,16 @@ def _metric_text(metric: Metric) -> str:
     text = (
         f"{metric.name} [{metric.unit}]: {metric.description}\nSource: {metric.source}\n"
         f"Better: {metric.better}. Violation scale: {metric.scale:g} {metric.unit}. "
-        f"{'Needs a region. ' if metric.needs_region else ''}"
+        f"{_region_text(metric)}"
         f"{'' if metric.differentiable else 'May jump with the design: no gradient methods.'}"
     ).rstrip()
     return text + ("\n\n" + table(["option", "values", "default", "what it is"], rows) if rows else "")
+
+
+def _region_text(metric: Metric) -> str:
+    if not metric.needs_region:
+        return ""
+    return "Needs a region, but over: aspect does not. " if metric.option("over") else "Needs a region. "
 
 
 def _values(option: Option) -> str:

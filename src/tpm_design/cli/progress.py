@@ -71,6 +71,7 @@ def _bar(budget: int, best: _Best) -> Iterator[Callable[[Entry], None]]:
 
 
 def _lines(budget: int, best: _Best) -> Callable[[Entry], None]:
+    print("Searching; the equations are compiled on first use.", file=sys.stderr, flush=True)
     last = time.monotonic()
 
     def watch(entry: Entry) -> None:

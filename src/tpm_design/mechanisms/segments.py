@@ -57,6 +57,8 @@ def _square(w, u, v, s, t):  # type: ignore[no-untyped-def]
 def chain_distance(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
     """Distance (m) between the two-link chains a0–a1–a2 and b0–b1–b2."""
     return min(
-        min(segment_distance(a0, a1, b0, b1), segment_distance(a0, a1, b1, b2)),
-        min(segment_distance(a1, a2, b0, b1), segment_distance(a1, a2, b1, b2)),
+        segment_distance(a0, a1, b0, b1),
+        segment_distance(a0, a1, b1, b2),
+        segment_distance(a1, a2, b0, b1),
+        segment_distance(a1, a2, b1, b2),
     )

@@ -521,9 +521,7 @@ def farthest_reach(ranges: Mapping[str, tuple[float, float]]) -> float:
     return span("f")[1] + span("r")[1] + offset
 
 
-def mode_candidates(
-    ranges: Mapping[str, tuple[float, float]], isotropic: bool
-) -> tuple[dict[str, str], ...]:
+def mode_candidates(ranges: Mapping[str, tuple[float, float]], isotropic: bool) -> tuple[dict[str, str], ...]:
     """Sign strings of one mode per orbit of the symmetries that every design of the ranges has.
 
     All 64 unless ``isotropic``: a region that stays in its place tells equal modes apart. A caller whose

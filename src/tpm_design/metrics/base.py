@@ -39,7 +39,8 @@ class Measurement:
     Values may be flat where a constraint on them fails; then ``depth`` ≤ 0 is added to a negative slack,
     and ``full_slack`` replaces the slack of a constraint that asks for the full score 1 (coverage).
     ``pieces``: values whose least (of a metric to be large) or greatest is ``value``, or the pieces of
-    ``full_slack``: smoother in the design than their minimum. ``notes`` are extra columns, such as which locus was nearest.
+    ``full_slack``: smoother in the design than their minimum. ``notes`` are extra columns, such as which
+    locus was nearest.
     """
 
     value: float

@@ -91,10 +91,8 @@ def _share_of(
     context: Context, options: Mapping[str, Any], averages: Averages, integral: float, coarse: int
 ) -> float:
     """Integral over the domain's whole volume: poses of the region out of reach count as 0."""
-    if options["over"] == "region":
-        whole = context.region_aspects[coarse].whole
-    else:
-        whole = averages.volume
+    over_region = options["over"] == "region"
+    whole = context.region_aspects[coarse].whole if over_region else averages.volume
     # a domain that is whole may differ from its parts by rounding
     return min(1.0, integral / whole) if whole > 0.0 else 0.0
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.workspace.indices import Index, index_value, index_values
-from tpm_design.workspace.region_geometry import POINTS, PlacedRegion, nearest
+from tpm_design.workspace.region_geometry import POINTS, PlacedRegion, nearest, surface_frame
 
 EIGHTHS = 8
+MOST_MOVES = 400
 FINEST_STEP = 1e-7
 ERROR_FLOOR = 1e-10
 
@@ -34,16 +35,13 @@ def _polish(geometry, mode, region, index, start, value, step, smallest):  # typ
     """Compass search inside the region from ``start``: (value, decrease by the smallest steps, x, y, z)."""
     x, y, z = start[0], start[1], start[2]
     last = 0.0
-    while step > smallest:
+    for _ in range(MOST_MOVES):
+        if step <= smallest:
+            break
         best, bx, by, bz = value, x, y, z
-        for axis in range(3):
-            for sign in (-1.0, 1.0):
-                u = nearest(
-                    region,
-                    x + (sign * step if axis == 0 else 0.0),
-                    y + (sign * step if axis == 1 else 0.0),
-                    z + (sign * step if axis == 2 else 0.0),
-                )
+        for way in surface_frame(region, x, y, z):
+            for sign in (-step, step):
+                u = nearest(region, x + sign * way[0], y + sign * way[1], z + sign * way[2])
                 trial = index_value(geometry, mode, index, u[0], u[1], u[2])
                 if trial < best:
                     best, bx, by, bz = trial, u[0], u[1], u[2]

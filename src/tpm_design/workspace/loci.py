@@ -20,7 +20,7 @@ from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.pointwise import reach_row, singularity_row
 from tpm_design.workspace.indices import determinant_at
 from tpm_design.workspace.poses import workspace_margin
-from tpm_design.workspace.region_geometry import PlacedRegion, nearest, signed_distance
+from tpm_design.workspace.region_geometry import PlacedRegion, nearest, perpendicular, signed_distance
 
 CANDIDATES = 4
 APART = 0.3
@@ -242,7 +242,7 @@ def _slide(geometry, mode, region, part, start, step, smallest):  # type: ignore
         moved = trial[0] < best
         stepped = moved
         if not moved:
-            ax, ay, az = _perpendicular(normal)
+            ax, ay, az = perpendicular(normal)
             bx = normal[1] * az - normal[2] * ay
             by = normal[2] * ax - normal[0] * az
             bz = normal[0] * ay - normal[1] * ax
@@ -321,7 +321,7 @@ def _rim_point(geometry, mode, part, bound, start, width):  # type: ignore[no-un
             x, y, z = x - share * nx, y - share * ny, z - share * nz
         size = math.sqrt(square)
         n = (nx / size, ny / size, nz / size)
-        a = _perpendicular(n)
+        a = perpendicular(n)
         b = (n[1] * a[2] - n[2] * a[1], n[2] * a[0] - n[0] * a[2], n[0] * a[1] - n[1] * a[0])
         value = determinant_at(geometry, mode, part, x, y, z)
         ga = _along(geometry, mode, part, (x, y, z), a, h) - _along(geometry, mode, part, (x, y, z), a, -h)
@@ -374,20 +374,6 @@ def _slide_on_rim(geometry, mode, region, part, start, best, step, smallest):  #
     if here < best:
         return here, pose[0], pose[1], pose[2]
     return best, x, y, z
-
-
-@inner
-def _perpendicular(normal):  # type: ignore[no-untyped-def]
-    """A unit vector perpendicular to a unit vector."""
-    nx, ny, nz = normal
-    if abs(nx) <= abs(ny) and abs(nx) <= abs(nz):
-        size = math.sqrt(ny * ny + nz * nz)
-        return 0.0, -nz / size, ny / size
-    if abs(ny) <= abs(nz):
-        size = math.sqrt(nx * nx + nz * nz)
-        return nz / size, 0.0, -nx / size
-    size = math.sqrt(nx * nx + ny * ny)
-    return -ny / size, nx / size, 0.0
 
 
 @kernel

@@ -44,7 +44,7 @@ def _ellipsoid_foot(half, x, y, z):  # type: ignore[no-untyped-def]
     The foot is half²·p/(half² + t) for the root t > −min half² of Σ (half·p/(half² + t))² = 1.
     """
     a, b, c = half[0] * half[0], half[1] * half[1], half[2] * half[2]
-    least = min(a, min(b, c))
+    least = min(a, b, c)
     size = math.sqrt(x * x + y * y + z * z)
     if size <= 1e-14 * math.sqrt(least):
         # the centre: the end of the shortest half axis
@@ -54,7 +54,7 @@ def _ellipsoid_foot(half, x, y, z):  # type: ignore[no-untyped-def]
     if a == b and b == c:
         return half[0] * x / size, half[0] * y / size, half[0] * z / size
     # convex and decreasing in t: Newton from the left never overshoots, bisection guards the rest
-    low, high = -least * (1.0 - 1e-14), math.sqrt(max(a, max(b, c))) * size
+    low, high = -least * (1.0 - 1e-14), math.sqrt(max(a, b, c)) * size
     t = 0.0
     for _ in range(100):
         u, v, w = half[0] * x / (a + t), half[1] * y / (b + t), half[2] * z / (c + t)
@@ -112,7 +112,7 @@ def signed_distance(region, x, y, z):  # type: ignore[no-untyped-def]
         return outside if outside > 0.0 else max(ex, ey)
     ex, ey, ez = abs(dx) - half[0], abs(dy) - half[1], abs(dz) - half[2]
     outside = math.sqrt(max(ex, 0.0) ** 2 + max(ey, 0.0) ** 2 + max(ez, 0.0) ** 2)
-    return outside if outside > 0.0 else max(ex, max(ey, ez))
+    return outside if outside > 0.0 else max(ex, ey, ez)
 
 
 @inner
@@ -138,3 +138,40 @@ def nearest(region, x, y, z):  # type: ignore[no-untyped-def]
         cy + min(half[1], max(-half[1], dy)),
         cz + min(half[2], max(-half[2], dz)),
     )
+
+
+@inner
+def perpendicular(normal):  # type: ignore[no-untyped-def]
+    """A unit vector perpendicular to a unit vector."""
+    nx, ny, nz = normal
+    if abs(nx) <= abs(ny) and abs(nx) <= abs(nz):
+        size = math.sqrt(ny * ny + nz * nz)
+        return 0.0, -nz / size, ny / size
+    if abs(ny) <= abs(nz):
+        size = math.sqrt(nx * nx + nz * nz)
+        return nz / size, 0.0, -nx / size
+    size = math.sqrt(nx * nx + ny * ny)
+    return -ny / size, nx / size, 0.0
+
+
+@inner
+def surface_frame(region, x, y, z):  # type: ignore[no-untyped-def]
+    """Three unit vectors, of which all but those that lead out lie in the faces of the region at a pose of
+    its surface, or along its edges."""
+    dx, dy, dz = x - region.centre[0], y - region.centre[1], z - region.centre[2]
+    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    if region.form == CYLINDER:
+        size = math.sqrt(dx * dx + dy * dy)
+        if size == 0.0:
+            return axes
+        c, s = dx / size, dy / size
+        return (c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)
+    if region.form == ELLIPSOID:
+        u, v, w = dx / region.half[0] ** 2, dy / region.half[1] ** 2, dz / region.half[2] ** 2
+        size = math.sqrt(u * u + v * v + w * w)
+        if size == 0.0:
+            return axes
+        n = (u / size, v / size, w / size)
+        a = perpendicular(n)
+        return n, a, (n[1] * a[2] - n[2] * a[1], n[2] * a[0] - n[0] * a[2], n[0] * a[1] - n[1] * a[0])
+    return axes

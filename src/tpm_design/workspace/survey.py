@@ -74,9 +74,7 @@ def survey(mechanism: Mechanism, mode: Mode, *, order: int) -> Survey:
     return Survey(poses, _part_pairs(parts.ray, neighbours, len(directions)), determinants.reshape(shape))
 
 
-def _part_pairs(
-    ray: NDArray[np.int64], neighbours: NDArray[np.int64], count: int
-) -> NDArray[np.int64]:
+def _part_pairs(ray: NDArray[np.int64], neighbours: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """The first part of each ray beside the first part of its neighbour, the second beside the second …"""
     first = np.searchsorted(ray, np.arange(count + 1))
     parts = np.diff(first)
