@@ -175,6 +175,7 @@ def _slack(goal: Goal, measurement: Measurement, value: float) -> float:
 def _measure(context: Context, goal: Goal) -> Measurement:
     options = {option.name: goal.options.get(option.name, option.default) for option in goal.metric.options}
     measurement = goal.metric.compute(context, options)
-    if not math.isfinite(measurement.value) and UNDEFINED not in measurement.notes:
-        raise ArithmeticError(f"{goal.label} is {measurement.value!r}")
+    value, error = measurement.value, measurement.error
+    if UNDEFINED not in measurement.notes and not (math.isfinite(value) and math.isfinite(error)):
+        raise ArithmeticError(f"{goal.label} is {value!r} with error {error!r}")
     return measurement

@@ -9,7 +9,7 @@ import numpy as np
 
 from tpm_design.metrics.base import Measurement, Metric, Option
 from tpm_design.metrics.context import Context
-from tpm_design.workspace.averages import Averages, conditioning_averages
+from tpm_design.workspace.averages import GAUSS_NODES, Averages, conditioning_averages
 from tpm_design.workspace.indices import CONDITION_2, CONDITION_FROBENIUS, Index, index_values
 from tpm_design.workspace.region_geometry import POINTS
 
@@ -38,8 +38,9 @@ def _averages(context: Context, options: Mapping[str, Any], threshold: float) ->
             frobenius=frobenius,
             motor=motor,
             threshold=threshold,
+            nodes=nodes,
         )
-        for field in fields
+        for field, nodes in zip(fields, GAUSS_NODES[options["over"]], strict=True)
     )
     return fine, coarse
 

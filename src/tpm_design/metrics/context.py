@@ -19,6 +19,7 @@ from tpm_design.workspace.survey import Survey, survey, survey_crossings
 from tpm_design.workspace.volume import coarser, rays_for
 
 FEELERS_PER_SAMPLE = 0.8
+SURVEY_RAYS_PER_SAMPLE = 1.4
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,8 @@ class Context:
 
     @cached_property
     def _survey(self) -> Survey:
-        return survey(self.mechanism, self.mode, order=self.region_samples)
+        order = max(3, round(SURVEY_RAYS_PER_SAMPLE * self.region_samples))
+        return survey(self.mechanism, self.mode, order=order)
 
     def locus_distance(self, part: int) -> LocusDistance:
         """Distance (m) to the locus of one determinant, for a region reachable throughout.

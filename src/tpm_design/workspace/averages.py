@@ -13,7 +13,8 @@ from tpm_design.arithmetic import inner, kernel
 from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.indices import condition_at
 
-GAUSS_NODES = 8
+# along a segment, fine and coarse: 1/κ has kinks where singular values change places
+GAUSS_NODES = {"region": (8, 6), "aspect": (16, 12)}
 
 
 @dataclass(frozen=True)
@@ -97,9 +98,9 @@ def _integrate(  # type: ignore[no-untyped-def]
 
 
 @cache
-def _nodes() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _nodes(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Places in [0, 1] and weights, crowded at both ends of a segment."""
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(count)
     angles = 0.5 * np.pi * (nodes + 1.0)
     return 0.5 * (1.0 - np.cos(angles)), weights * 0.25 * np.pi * np.sin(angles)
 
@@ -113,8 +114,9 @@ def conditioning_averages(
     frobenius: bool,
     motor: float,
     threshold: float,
+    nodes: int,
 ) -> Averages:
-    """Integrals of 1/κ over one component of the field, or over all its segments.
+    """Integrals of 1/κ over one component of the field, or over all its segments, by ``nodes`` along each.
 
     Nodes crowd at the ends of a segment, where 1/κ goes to zero with the root of the distance.
     """
@@ -131,7 +133,7 @@ def conditioning_averages(
         field.rays.directions,
         field.rays.weights,
         chosen,
-        _nodes(),
+        _nodes(nodes),
     )
     cell = float(abs(np.prod(field.scale)))
     return Averages(cell * volume, cell * total, cell * above, least if volume > 0.0 else 0.0)

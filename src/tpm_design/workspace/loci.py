@@ -23,6 +23,7 @@ from tpm_design.workspace.poses import workspace_margin
 from tpm_design.workspace.region_geometry import PlacedRegion, nearest, perpendicular, signed_distance
 
 CANDIDATES = 4
+TRIES = 12
 APART = 0.3
 LEVELS = 200
 SLIDES = 200
@@ -344,7 +345,7 @@ def _rim_point(geometry, mode, part, bound, start, width):  # type: ignore[no-un
 
 @inner
 def _slide_on_rim(geometry, mode, region, part, start, best, step, smallest):  # type: ignore[no-untyped-def]
-    """Least signed distance along the rim of the locus, from one of its poses near a bound of the workspace."""
+    """Least signed distance along the rim of the locus, from one of its poses near a bound of reach."""
     bound, _ = _nearest_bound(geometry, mode, start[0], start[1], start[2])
     x, y, z = start
     found, pose, rim = _rim_point(geometry, mode, part, bound, start, step)
@@ -380,8 +381,11 @@ def _slide_on_rim(geometry, mode, region, part, start, best, step, smallest):  #
 def _best_slide(geometry, mode, region, part, starts, distances, stride, step, smallest):  # type: ignore[no-untyped-def]
     """Slide from the nearest starts that lie apart; ``stride`` skips starts."""
     best, bx, by, bz = math.inf, math.nan, math.nan, math.nan
-    chosen = np.full(CANDIDATES, -1, np.int64)
-    for k in range(CANDIDATES):
+    chosen = np.full(TRIES, -1, np.int64)
+    # a start that does not get onto the locus bars only what is next to it
+    failed = np.zeros(TRIES, np.bool_)
+    arrived = 0
+    for k in range(TRIES):
         pick = -1
         for n in range(0, distances.size, stride):
             if not distances[n] < math.inf or (pick >= 0 and distances[n] >= distances[pick]):
@@ -394,10 +398,11 @@ def _best_slide(geometry, mode, region, part, starts, distances, stride, step, s
                 square = 0.0
                 for axis in range(3):
                     square += (starts[n, axis] - starts[m, axis]) ** 2
-                apart = apart and square > separation * separation
+                least = 2.0 * step if failed[j] else separation
+                apart = apart and square > least * least
             if apart:
                 pick = n
-        if pick < 0:
+        if pick < 0 or arrived == CANDIDATES:
             break
         chosen[k] = pick
         start = (starts[pick, 0], starts[pick, 1], starts[pick, 2])
@@ -407,6 +412,8 @@ def _best_slide(geometry, mode, region, part, starts, distances, stride, step, s
         # also from a start that leaves the workspace on its way to the locus
         if _nearest_bound(geometry, mode, start[0], start[1], start[2])[1] < RIM_REACH * step:
             found = _slide_on_rim(geometry, mode, region, part, start, found[0], step, smallest)
+        failed[k] = not found[0] < math.inf
+        arrived += not failed[k]
         if found[0] < best:
             best, bx, by, bz = found
     return best, bx, by, bz
@@ -438,9 +445,12 @@ def locus_distance(
 
     ``grid`` (I, J, K, 3): the region's lattice; ``determinants`` (D, I, J, K) on it; feelers as of
     ``sampling.feelers``; ``known`` (N, 3): points of the locus found elsewhere; ``spacing`` (m) of the
-    lattice; ``limit`` (m) at which feelers end.
+    lattice; ``limit`` (m) at which feelers end at the latest.
     """
     inner = _lattice_crossings(determinants[part], grid)
+    if len(known):
+        # what lies beyond a known point of the locus is not the nearest
+        limit = min(limit, max(0.0, float(_signed_distances(region, known).min())) + spacing)
     ways = _march(
         geometry, signs, len(determinants), part, feeler_points, feeler_normals, 0.5 * spacing, limit
     )
@@ -469,7 +479,8 @@ def _nearest_locus(
     if not best[0] < math.inf:
         return LocusDistance(math.inf, 0.0, None)
     pose = (float(best[1]), float(best[2]), float(best[3]))
-    missed = abs(fine[0] - coarse[0]) if coarse[0] < math.inf else abs(float(best[0]))
+    both = max(fine[0], coarse[0]) < math.inf
+    missed = abs(fine[0] - coarse[0]) if both else abs(float(best[0]))
     return LocusDistance(float(best[0]), missed + ERROR_FLOOR * spacing, pose)
 
 

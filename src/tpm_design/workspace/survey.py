@@ -21,7 +21,7 @@ from tpm_design.workspace.rays import trace
 
 NEAREST_PLANE = 1e-7
 ALONG = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 13))
-BISECTIONS = 12
+BISECTIONS = 3
 
 
 @dataclass(frozen=True)
