@@ -55,7 +55,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class Singularity:
-    """One family of singularities. ``locus`` names the determinant that vanishes, if one does."""
+    """One family of singularities; named as its determinant, if one vanishes."""
 
     name: str
     condition: str

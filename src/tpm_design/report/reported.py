@@ -9,7 +9,7 @@ from tpm_design.errors import ParameterError
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Problem, design_context
 from tpm_design.runs.folder import STUDY, StoredRun, read_run
-from tpm_design.runs.search import Entry, EvaluationLog
+from tpm_design.runs.search import Entry, best_entry
 from tpm_design.study import Study, load_study
 
 
@@ -40,12 +40,7 @@ def read_reported(folder: Path) -> Reported:
     """The run in ``folder``, finished or cut short. Raises UsageError or StudyError."""
     run = read_run(folder)
     study = load_study(folder / STUDY)
-    return Reported(study, run, run.best or best_of(study.problem, run.entries))
-
-
-def best_of(problem: Problem, entries: tuple[Entry, ...]) -> Entry | None:
-    """The entry a search of these entries would have ended with."""
-    return min(entries, key=EvaluationLog(problem, workers=1).rank, default=None)
+    return Reported(study, run, run.best or best_entry(study.problem, run.entries))
 
 
 def best_context(reported: Reported) -> Context | None:
