@@ -15,6 +15,7 @@ from tpm_design.arithmetic.functions import (
     magnitude,
     pos,
     root,
+    share_of_length,
     sine,
     sqr,
 )
@@ -36,6 +37,7 @@ __all__ = [
     "magnitude",
     "pos",
     "root",
+    "share_of_length",
     "sine",
     "sqr",
     "variables",

@@ -173,6 +173,16 @@ def direction_cosine(p: Any, q: Any) -> Any:
     return p / math.sqrt(max(p * p + q * q, LEAST_SQUARE))
 
 
+def _interval_share(p: Any, q: Any, length: Any) -> Any:
+    return direction_cosine(p, q)
+
+
+@scalar_function(intervals=_interval_share, duals=_interval_share)
+def share_of_length(p: Any, q: Any, length: Any) -> Any:
+    """``direction_cosine(p, q)`` where √(p² + q²) is known to be ``length``; NaN at the origin."""
+    return p / length
+
+
 def _dual_sine(x: Any) -> Any:
     return Dual(sine(x.value), multiples(cosine(x.value), x.derivatives))
 
