@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tpm_design.arithmetic import Interval
 from tpm_design.errors import ParameterError, did_you_mean
 from tpm_design.mechanisms import pointwise
 from tpm_design.mechanisms.base import MechanismKind
@@ -49,6 +50,10 @@ class Mechanism(ABC):
     @abstractmethod
     def total_link_length(self) -> float:
         """Sum over the limbs of the moving links (m)."""
+
+    @abstractmethod
+    def enclosed_link_length(self, tolerance: Mapping[str, float]) -> Interval:
+        """Bounds (m) of ``total_link_length`` for every machine within ``tolerance``."""
 
     @abstractmethod
     def fk(self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor") -> FloatArray:

@@ -37,7 +37,7 @@ from tpm_design.arithmetic.lifting import replaced
 from tpm_design.mechanisms import equations, forward
 from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.mechanism import FloatArray, Mechanism, Mode
-from tpm_design.mechanisms.parameters import limb_values, mode_signs, three_numbers
+from tpm_design.mechanisms.parameters import limb_tolerances, limb_values, mode_signs, three_numbers
 from tpm_design.mechanisms.segments import chain_distance
 from tpm_design.mechanisms.symmetry import IDENTITY, SignedPermutation, mode_orbits, symmetries
 
@@ -535,15 +535,18 @@ class Uru(Mechanism):
             f + r + abs(p - b) for f, r, p, b in zip(g.proximal, g.distal, g.platform, g.base, strict=True)
         )
 
-    def enclosed_geometry(self, tolerance: Mapping[str, float]) -> UruGeometry:
-        around = {name: Interval(-bound, bound) for name, bound in tolerance.items()}
+    def enclosed_geometry(self, tolerance: Mapping[str, float]) -> Any:
+        bounds = limb_tolerances(self.kind, tolerance)
 
         def held(name: str) -> Any:
-            exact = Interval(0.0, 0.0)
-            return tuple(value + around.get(name, exact) for value in self.parameters[name])
+            around = bounds.get(name, (0.0, 0.0, 0.0))
+            return tuple(
+                Interval(value, value) if bound == 0.0 else value + Interval(-bound, bound)
+                for value, bound in zip(self.parameters[name], around, strict=True)
+            )
 
         ranges = [limit_enclosure(*(FULL_TURN if r is None else r)) for r in self.joint_ranges]
-        bounds = [
+        limit_bounds = [
             Interval(NO_LIMIT, NO_LIMIT) if joint is None else bound
             for joint, (_, _, bound) in zip(self.joint_ranges, ranges, strict=True)
         ]
@@ -555,12 +558,19 @@ class Uru(Mechanism):
             "gear": held("k"),
             "limit_cosine": tuple(middle for middle, _, _ in ranges),
             "limit_sine": tuple(middle for _, middle, _ in ranges),
-            "limit_bound": tuple(bounds),
+            "limit_bound": tuple(limit_bounds),
         }
         return self.geometry._replace(**intervals)
 
     def total_link_length(self) -> float:
         return sum(self.geometry.proximal) + sum(self.geometry.distal)
+
+    def enclosed_link_length(self, tolerance: Mapping[str, float]) -> Interval:
+        g = self.enclosed_geometry(tolerance)
+        total = Interval(0.0, 0.0)
+        for length in (*g.proximal, *g.distal):
+            total = total + length
+        return total
 
     def fk(self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor") -> FloatArray:
         """Every real assembly (K, 3) in metres for the actuator coordinates ``q`` (3,) in rad, of all working

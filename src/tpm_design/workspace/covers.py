@@ -12,6 +12,7 @@ A cover is a box and a text, in preorder: "x", "y", "z" a bisection across that 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -261,8 +262,8 @@ class Cover:
 @dataclass(frozen=True)
 class Proof:
     """How far a proof came. ``covers`` are complete if it is ``proved``; else ``open_box`` (3, 2) is a box on
-    which the statement was not proved. ``ending`` "small": that box is as small as is tried; "limit": the boxes
-    ran out. ``boxes``: how many were looked at."""
+    which the statement was not proved. ``ending`` "small": that box is as small as is tried; "limit": no
+    boxes were left. ``boxes``: how many were looked at."""
 
     ending: Literal["proved", "small", "limit"]
     covers: tuple[Cover, ...]
@@ -280,7 +281,7 @@ def prove(
     mode: Mode,
     region: PlacedRegion,
     *,
-    tolerance: dict[str, float],
+    tolerance: Mapping[str, float],
     distance: float,
     boxes: int,
 ) -> Proof:
