@@ -23,6 +23,8 @@ FAST_MATH = {"contract", "reassoc", "nsz", "arcp", "afn"}
 
 FAST: Any = {"fastmath": FAST_MATH, "error_model": "numpy", "forceinline": True}
 STRICT: Any = {"fastmath": False, "error_model": "numpy", "forceinline": False}
+# x − |x|·2⁻⁵² may be one instruction: the product is exact
+PRIMITIVE: Any = {"fastmath": {"contract"}, "error_model": "numpy", "forceinline": True}
 
 
 class _InnerFunction(CPUDispatcher):
