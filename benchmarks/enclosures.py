@@ -119,7 +119,7 @@ def rows() -> list[Row]:
         (bounds, enclosed, held),
         (slope_bounds, enclosed, np.empty((9, 4, 2, count))),
     ]
-    calls = []
+    calls: list[Callable[[], float]] = []
     for function, geometry, out in tasks:
         call = partial(function, geometry, signs, centres, HALF_WIDTH, out)
         call()

@@ -10,7 +10,7 @@ import pytest
 from tpm_design.arithmetic import Interval
 
 # isort: split
-from two_link_kernel import determinant_bounds, link_at, link_bounds
+from two_link_kernel import determinant_bounds, length_slopes, link_at, link_bounds
 
 LENGTHS = [(1.0, 1.0), (1.0, 0.8), (0.7, 1.1)]
 ELBOWS = (1.0, -1.0)
@@ -126,6 +126,22 @@ def test_bounds_hold_every_machine_within_the_tolerances() -> None:
             values = floats(points, f + df, r + dr, -1.0)
             assert (held[:, :, 0, 0] - 1e-12 <= values).all()
             assert (values <= held[:, :, 0, 1] + 1e-12).all()
+
+
+@pytest.mark.parametrize(("f", "r"), LENGTHS)
+@pytest.mark.parametrize("elbow", ELBOWS)
+def test_derivatives_by_the_lengths(f: float, r: float, elbow: float) -> None:
+    step = 1e-6
+    for alpha, beta in points_within(f, r, 0.1, 30, 10).tolist():
+        found = length_slopes(alpha, beta, f, r, elbow)
+        arguments = [Interval(x - 1e-3, x + 1e-3) for x in (alpha, beta, f, r)]
+        held = length_slopes(*arguments, elbow)
+        for j, (da, df, dr) in enumerate(step * np.eye(3)):
+            more = floats(np.array([[alpha + da, beta]]), f + df, r + dr, elbow)[0]
+            less = floats(np.array([[alpha - da, beta]]), f - df, r - dr, elbow)[0]
+            for value, bound, slope in zip(found, held, (more - less) / (2 * step), strict=True):
+                assert value.derivatives[j] == pytest.approx(slope, rel=1e-6, abs=1e-7)
+                assert bound.derivatives[j].lo <= value.derivatives[j] <= bound.derivatives[j].hi
 
 
 def test_the_determinant_and_its_cofactors() -> None:

@@ -41,6 +41,13 @@ def link_bounds(boxes: np.ndarray, f: Any, r: Any, elbow: float, out: np.ndarray
 
 
 @njit
+def length_slopes(alpha: Any, beta: Any, f: Any, r: Any, elbow: float) -> Any:
+    """(a, c, γ) with derivatives by α, f and r."""
+    u, proximal, distal = variables((alpha, f, r))
+    return distal_link(u, beta, sqr(u) + sqr(beta), proximal, distal, elbow)
+
+
+@njit
 def determinant_bounds(entries: np.ndarray, half: float) -> Any:
     """Bounds of the determinant of a matrix, given within ± half as nine numbers, and of its derivatives."""
     e = variables(

@@ -42,6 +42,11 @@ class Mechanism(ABC):
         """Every reachable pose lies within this distance (m) of the origin."""
 
     @abstractmethod
+    def enclosed_geometry(self, tolerance: Mapping[str, float]) -> Any:
+        """The geometry as Intervals that hold every machine whose parameters differ from this one's by no
+        more than ``tolerance`` (name → ±, SI), each limb by itself; ``{}``: this machine alone."""
+
+    @abstractmethod
     def total_link_length(self) -> float:
         """Sum over the limbs of the moving links (m)."""
 

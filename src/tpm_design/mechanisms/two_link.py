@@ -13,9 +13,9 @@ import math
 from typing import Any
 
 from tpm_design.arithmetic import Dual, Interval, root, sqr
-from tpm_design.arithmetic.compilation import FAST, STRICT
-from tpm_design.arithmetic.dual import combinations, is_constant, is_dual, multiples
-from tpm_design.arithmetic.interval import bounded, hull, is_interval
+from tpm_design.arithmetic.compilation import FAST, STRICT, is_number
+from tpm_design.arithmetic.dual import as_dual, combinations, differences, is_dual, multiples
+from tpm_design.arithmetic.interval import bounded, hull
 from tpm_design.arithmetic.interval_functions import as_interval, keeps_away
 
 # isort: split
@@ -25,8 +25,7 @@ from numba.extending import overload, register_jitable
 def distal_link(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
     """(a, c, γ) of links f and r for a point with ρ² = α² + β²; elbow + has γ < 0.
 
-    Out of reach the elbow stays straight. In compiled code, for floats, Intervals and Duals of either in the
-    point; the lengths may be floats or Intervals.
+    Out of reach the elbow stays straight. In compiled code, for floats, Intervals and Duals of either.
     """
     raise NotImplementedError
 
@@ -65,7 +64,8 @@ def natural_bounds(alpha: Interval, beta: Interval, rho_squared: Interval, lengt
 @register_jitable(**STRICT)
 def ends(x: Interval, rate: Interval) -> Any:
     """The end of ``x`` where what changes at this rate, in one sense, is least, and where it is greatest."""
-    rising, falling = rate.lo >= 0.0, rate.hi <= 0.0
+    rising = rate.lo >= 0.0
+    falling = (rate.hi <= 0.0) & (not rising)
     first = bounded(x.hi if falling else x.lo, x.lo if rising else x.hi)
     last = bounded(x.hi if rising else x.lo, x.lo if falling else x.hi)
     return first, last
@@ -98,13 +98,14 @@ def _intervals(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: A
     )
 
 
-def _duals(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
-    a, c, gamma = distal_link(alpha.value, beta.value, rho_squared.value, f, r, elbow)
+def _duals_of_the_point(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
+    along, across = as_dual(alpha, rho_squared), as_dual(beta, rho_squared)
+    a, c, gamma = distal_link(along.value, across.value, rho_squared.value, f, r, elbow)
     scale = -1.0 / (r * gamma)
     turn = combinations(
-        (alpha.value - r * a) * scale, alpha.derivatives, (beta.value - r * c) * scale, beta.derivatives
+        (along.value - r * a) * scale, along.derivatives, (across.value - r * c) * scale, across.derivatives
     )
-    # γ² = f² − [(ρ² − f² − r²)/2r]²
+    # γ² = f² − q², q = (ρ² − f² − r²)/2r
     slope = (rho_squared.value - (sqr(f) + sqr(r))) * scale / (4.0 * r)
     return (
         Dual(a, multiples(-c, turn)),
@@ -113,18 +114,35 @@ def _duals(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) 
     )
 
 
+def _duals_of_the_lengths(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
+    """As above with dφ = [… − f df − q dr] and γ dγ = (1 + q/r)(f df + q dr) − (q/2r) dρ²."""
+    proximal, distal = as_dual(f, r), as_dual(r, f)
+    point = as_dual(rho_squared, proximal)
+    along, across = as_dual(alpha, proximal), as_dual(beta, proximal)
+    f_value, r_value = proximal.value, distal.value
+    a, c, gamma = distal_link(along.value, across.value, point.value, f_value, r_value, elbow)
+    q = (point.value - (sqr(f_value) + sqr(r_value))) / (2.0 * r_value)
+    scale = -1.0 / (r_value * gamma)
+    by_point = combinations(
+        along.value - r_value * a, along.derivatives, across.value - r_value * c, across.derivatives
+    )
+    by_lengths = combinations(f_value, proximal.derivatives, q, distal.derivatives)
+    turn = multiples(scale, differences(by_point, by_lengths))
+    gain = combinations((1.0 + q / r_value) / gamma, by_lengths, q * scale * 0.5, point.derivatives)
+    return Dual(a, multiples(-c, turn)), Dual(c, multiples(a, turn)), Dual(gamma, gain)
+
+
 def _for_floats(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
-    given = (alpha, beta, rho_squared, f, r)
-    return None if any(is_dual(x) or is_interval(x) for x in given) else _closed_form
+    return _closed_form if all(map(is_number, (alpha, beta, rho_squared, f, r))) else None
 
 
-def _for_bounds(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
-    point = (alpha, beta, rho_squared)
-    if all(is_dual(x) for x in point) and is_constant(f) and is_constant(r):
-        return _duals
-    constants = all(is_constant(x) for x in (*point, f, r))
-    return _intervals if constants and any(is_interval(x) for x in (*point, f, r)) else None
+def _for_others(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
+    if is_dual(f) or is_dual(r):
+        return _duals_of_the_lengths
+    if is_dual(rho_squared):
+        return _duals_of_the_point
+    return None if all(map(is_number, (alpha, beta, rho_squared, f, r))) else _intervals
 
 
 overload(distal_link, jit_options=FAST, strict=False)(_for_floats)
-overload(distal_link, jit_options=STRICT, strict=False)(_for_bounds)
+overload(distal_link, jit_options=STRICT, strict=False)(_for_others)

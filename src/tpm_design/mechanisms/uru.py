@@ -19,6 +19,7 @@ from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
 from tpm_design.arithmetic import (
+    Interval,
     arctangent2,
     cosine,
     direction,
@@ -32,6 +33,7 @@ from tpm_design.arithmetic import (
 )
 from tpm_design.arithmetic.algebra import determinant
 from tpm_design.arithmetic.compilation import STRICT
+from tpm_design.arithmetic.lifting import replaced
 from tpm_design.mechanisms import equations, forward
 from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.mechanism import FloatArray, Mechanism, Mode
@@ -239,6 +241,33 @@ def _velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-de
     return ((a11, a12, a13), (a21, a22, a23), (a31, a32, a33)), (b1, b2, b3)
 
 
+def limb_unit_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-untyped-def]
+    """Unit row along e_i, e_j, e_k, entry of b, and factor of one limb, see the implementation."""
+    raise NotImplementedError
+
+
+@formula(limb_unit_velocity, UruGeometry)
+def _limb_unit_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-untyped-def]
+    """cos ψ v_i + sin ψ g_i and k_i γ_i cos ψ, with tan ψ = k_i γ_i/β_i for motors and 0 for joints."""
+    a, c, gamma, beta, _, _ = limb_chain(geometry, limb, elbow, p, pj, pk)
+    hj, hk = direction(pj, pk)
+    toward, across = direction(beta, (motor * geometry.gear[limb]) * gamma)
+    row = (toward * a, toward * (c * hj) - across * hk, toward * (c * hk) + across * hj)
+    # lever · cos ψ = β sin ψ keeps its digits where the lever is long
+    entry = motor * (beta * across) + (1.0 - motor) * gamma
+    return row, entry, toward
+
+
+@formula(equations.unit_velocity_map, UruGeometry)
+def _unit_velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
+    """(18) as it is, (19) with each row divided by |w_i|."""
+    k1, k2, k3 = mode.elbows
+    (a11, a12, a13), b1, u1 = limb_unit_velocity(geometry, 0, k1, motor, x, y, z)
+    (a22, a23, a21), b2, u2 = limb_unit_velocity(geometry, 1, k2, motor, y, z, x)
+    (a33, a31, a32), b3, u3 = limb_unit_velocity(geometry, 2, k3, motor, z, x, y)
+    return ((a11, a12, a13), (a21, a22, a23), (a31, a32, a33)), (b1, b2, b3), (u1, u2, u3)
+
+
 def limb_angles(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
     """θ_i2, θ_i3 and θ_i4 of one limb (rad), see the implementation."""
     raise NotImplementedError
@@ -336,6 +365,35 @@ def _closure(geometry, motor, q, chart, u, v, w):  # type: ignore[no-untyped-def
     return (first, second, third), (excess1, excess2, excess3)
 
 
+@formula(equations.limb_parameters, UruGeometry)
+def _limb_parameters(geometry, limb):  # type: ignore[no-untyped-def]
+    """d_b, d_p, f, r, k."""
+    return (
+        geometry.base[limb],
+        geometry.platform[limb],
+        geometry.proximal[limb],
+        geometry.distal[limb],
+        geometry.gear[limb],
+    )
+
+
+@formula(equations.with_limb_parameters, UruGeometry)
+def _with_limb_parameters(geometry, limb, values):  # type: ignore[no-untyped-def]
+    """d_b, d_p, f, r, k of one limb replaced."""
+    return UruGeometry(
+        replaced(geometry.base, limb, values[0]),
+        replaced(geometry.platform, limb, values[1]),
+        replaced(geometry.proximal, limb, values[2]),
+        replaced(geometry.distal, limb, values[3]),
+        replaced(geometry.gear, limb, values[4]),
+        geometry.limited,
+        geometry.limit_cosine,
+        geometry.limit_sine,
+        geometry.limit_bound,
+        geometry.link_radius,
+    )
+
+
 @formula(equations.joint_centres, UruGeometry)
 def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """A_i = d_b e_i, B_i = p + d_p e_i and C_i = B_i − r_i v_i of each limb."""
@@ -425,11 +483,25 @@ def shaft_possible(angle: float, gear: float) -> bool:
     return min(ends) - math.pi <= angle <= max(ends) + math.pi
 
 
+FULL_TURN = (-math.pi, math.pi)
+# a bound on a cosine that every angle is above
+NO_LIMIT = -2.0
+
+
+def limit_enclosure(low: float, high: float) -> tuple[Interval, Interval, Interval]:
+    """Cosine and sine of the middle of a joint's range and cosine of its half width, each enclosed."""
+    middle = 0.5 * (Interval(low, low) + high)
+    half = 0.5 * (Interval(high, high) - low)
+    half = Interval(min(math.pi, half.lo), min(math.pi, half.hi))
+    return cosine(middle), sine(middle), cosine(half)
+
+
 @dataclass(frozen=True)
 class Uru(Mechanism):
     """A LaMaViP 3-URU with dimensions. Pose: (x, y, z) of the platform's point P."""
 
     geometry: UruGeometry
+    joint_ranges: tuple[tuple[float, float] | None, ...]
 
     def mode(self, *, octant: str, elbows: str) -> Mode:
         """The working mode on the given sides of the coordinate planes (``"any"``: all octants) with the
@@ -446,6 +518,30 @@ class Uru(Mechanism):
         return min(
             f + r + abs(p - b) for f, r, p, b in zip(g.proximal, g.distal, g.platform, g.base, strict=True)
         )
+
+    def enclosed_geometry(self, tolerance: Mapping[str, float]) -> UruGeometry:
+        around = {name: Interval(-bound, bound) for name, bound in tolerance.items()}
+
+        def held(name: str) -> Any:
+            exact = Interval(0.0, 0.0)
+            return tuple(value + around.get(name, exact) for value in self.parameters[name])
+
+        ranges = [limit_enclosure(*(FULL_TURN if r is None else r)) for r in self.joint_ranges]
+        bounds = [
+            Interval(NO_LIMIT, NO_LIMIT) if joint is None else bound
+            for joint, (_, _, bound) in zip(self.joint_ranges, ranges, strict=True)
+        ]
+        intervals: dict[str, Any] = {
+            "base": held("db"),
+            "platform": held("dp"),
+            "proximal": held("f"),
+            "distal": held("r"),
+            "gear": held("k"),
+            "limit_cosine": tuple(middle for middle, _, _ in ranges),
+            "limit_sine": tuple(middle for _, middle, _ in ranges),
+            "limit_bound": tuple(bounds),
+        }
+        return self.geometry._replace(**intervals)
 
     def total_link_length(self) -> float:
         return sum(self.geometry.proximal) + sum(self.geometry.distal)
@@ -482,7 +578,8 @@ def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str
     """A 3-URU from SI values: db, dp, f, r (m), k, each one number or three; limits as declared."""
     values = limb_values(KIND, parameters)
     ranges = [limits.get(f"theta{joint}") for joint in (1, 2, 3, 4)]
-    spans = [(-math.pi, math.pi) if r is None else (float(r[0]), float(r[1])) for r in ranges]
+    joint_ranges = tuple(None if r is None else (float(r[0]), float(r[1])) for r in ranges)
+    spans = [FULL_TURN if r is None else r for r in joint_ranges]
     middles = [0.5 * (low + high) for low, high in spans]
     halves = [min(math.pi, 0.5 * (high - low)) for low, high in spans]
     geometry = UruGeometry(
@@ -494,10 +591,12 @@ def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str
         limited=0.0 if all(r is None for r in ranges) else 1.0,
         limit_cosine=tuple(math.cos(m) for m in middles),
         limit_sine=tuple(math.sin(m) for m in middles),
-        limit_bound=tuple(-2.0 if r is None else math.cos(h) for r, h in zip(ranges, halves, strict=True)),
+        limit_bound=tuple(
+            NO_LIMIT if r is None else math.cos(h) for r, h in zip(joint_ranges, halves, strict=True)
+        ),
         link_radius=float(limits.get("link_radius", 0.0)),
     )
-    return Uru(kind=KIND, parameters=values, geometry=geometry)
+    return Uru(kind=KIND, parameters=values, geometry=geometry, joint_ranges=joint_ranges)
 
 
 def farthest_reach(ranges: Mapping[str, tuple[float, float]]) -> float:
