@@ -49,6 +49,8 @@ _NO_ENTRY: Any = {
 
 FAST: Any = {"fastmath": FAST_MATH, "error_model": "numpy", "forceinline": True, **_NO_ENTRY}
 STRICT: Any = {"fastmath": False, "error_model": "numpy", "forceinline": False, **_NO_ENTRY}
+# x − |x|·2⁻⁵² may be one instruction: the product is exact
+PRIMITIVE: Any = {"fastmath": {"contract"}, "error_model": "numpy", "forceinline": True, **_NO_ENTRY}
 
 
 class _InnerFunction(CPUDispatcher):

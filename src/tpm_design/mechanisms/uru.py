@@ -22,12 +22,12 @@ from tpm_design.arithmetic import (
     Interval,
     arctangent2,
     cosine,
+    direction,
     direction_cosine,
     formula,
     lesser,
     magnitude,
     root,
-    share_of_length,
     sine,
     sqr,
 )
@@ -40,6 +40,7 @@ from tpm_design.mechanisms.mechanism import FloatArray, Mechanism, Mode
 from tpm_design.mechanisms.parameters import limb_tolerances, limb_values, mode_signs, three_numbers
 from tpm_design.mechanisms.segments import chain_distance
 from tpm_design.mechanisms.symmetry import IDENTITY, SignedPermutation, mode_orbits, symmetries
+from tpm_design.mechanisms.two_link import distal_link
 
 Triple = tuple[float, ...]
 Quadruple = tuple[float, ...]
@@ -86,15 +87,7 @@ def _limb_chain(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-de
     beta_squared = sqr(pj) + sqr(pk)
     beta = root(beta_squared)
     rho_squared = sqr(alpha) + beta_squared
-    rho = root(rho_squared)
-    at_elbow = (rho_squared - sqr(f) - sqr(r)) / (2.0 * f * r)
-    gamma = -elbow * (f * root(1.0 - sqr(at_elbow)))
-    along = (rho_squared + (sqr(r) - sqr(f))) / (2.0 * r * rho)
-    across = gamma / rho
-    cosine_rho = share_of_length(alpha, beta, rho)
-    sine_rho = share_of_length(beta, alpha, rho)
-    a = cosine_rho * along - sine_rho * across
-    c = sine_rho * along + cosine_rho * across
+    a, c, gamma = distal_link(alpha, beta, rho_squared, f, r, elbow)
     return a, c, gamma, beta, rho_squared, alpha
 
 
@@ -189,30 +182,26 @@ def limb_rows(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
 
 @formula(limb_rows, UruGeometry)
 def _limb_rows(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
-    """v_i and w_i/|w_i|. With w_i = v_i + (k_i γ_i/β_i) g_i and g_i ⟂ v_i the unit row is
-    cos ψ v_i + sin ψ g_i, tan ψ = k_i γ_i/β_i: no pole on the axis e_i."""
+    """v_i, w_i/|w_i| and h_i's component along e_j. With w_i = v_i + (k_i γ_i/β_i) g_i and g_i ⟂ v_i the unit
+    row is cos ψ v_i + sin ψ g_i, tan ψ = k_i γ_i/β_i: no pole on the axis e_i."""
     a, c, gamma, beta, _, _ = limb_chain(geometry, limb, elbow, p, pj, pk)
-    hj = direction_cosine(pj, pk)
-    hk = direction_cosine(pk, pj)
-    lever = geometry.gear[limb] * gamma
-    toward = direction_cosine(beta, lever)
-    across = direction_cosine(lever, beta)
+    hj, hk = direction(pj, pk)
+    toward, across = direction(beta, geometry.gear[limb] * gamma)
     v = (a, c * hj, c * hk)
-    w = (toward * a, toward * (c * hj) - across * hk, toward * (c * hk) + across * hj)
-    return v, w
+    w = (toward * v[0], toward * v[1] - across * hk, toward * v[2] + across * hj)
+    return v, w, hj
 
 
 @formula(equations.singularity_margins, UruGeometry)
 def _singularity_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """det V (20), det W/∏|w_i| (36), det H (17)."""
     k1, k2, k3 = mode.elbows
-    (v11, v12, v13), (w11, w12, w13) = limb_rows(geometry, 0, k1, x, y, z)
-    (v22, v23, v21), (w22, w23, w21) = limb_rows(geometry, 1, k2, y, z, x)
-    (v33, v31, v32), (w33, w31, w32) = limb_rows(geometry, 2, k3, z, x, y)
+    (v11, v12, v13), (w11, w12, w13), h12 = limb_rows(geometry, 0, k1, x, y, z)
+    (v22, v23, v21), (w22, w23, w21), h23 = limb_rows(geometry, 1, k2, y, z, x)
+    (v33, v31, v32), (w33, w31, w32), h31 = limb_rows(geometry, 2, k3, z, x, y)
     translation = determinant(v11, v12, v13, v21, v22, v23, v31, v32, v33)
     actuation = determinant(w11, w12, w13, w21, w22, w23, w31, w32, w33)
-    rotation = 2.0 * direction_cosine(x, y) * direction_cosine(y, z) * direction_cosine(z, x)
-    return translation, actuation, rotation
+    return translation, actuation, 2.0 * h12 * h23 * h31
 
 
 @formula(equations.serial_margins, UruGeometry)
@@ -235,8 +224,7 @@ def limb_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-u
 def _limb_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-untyped-def]
     """Joints: v_i and γ_i (18). Motors: w_i = v_i + (k_i γ_i/β_i) g_i and k_i γ_i (19)."""
     a, c, gamma, beta, _, _ = limb_chain(geometry, limb, elbow, p, pj, pk)
-    hj = direction_cosine(pj, pk)
-    hk = direction_cosine(pk, pj)
+    hj, hk = direction(pj, pk)
     gear = geometry.gear[limb]
     swing = (motor * gear) * gamma / beta
     row = (a, c * hj - swing * hk, c * hk + swing * hj)
@@ -262,12 +250,8 @@ def limb_unit_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore
 def _limb_unit_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-untyped-def]
     """cos ψ v_i + sin ψ g_i and k_i γ_i cos ψ, with tan ψ = k_i γ_i/β_i for motors and 0 for joints."""
     a, c, gamma, beta, _, _ = limb_chain(geometry, limb, elbow, p, pj, pk)
-    hj = direction_cosine(pj, pk)
-    hk = direction_cosine(pk, pj)
-    gear = geometry.gear[limb]
-    lever = (motor * gear) * gamma
-    toward = direction_cosine(beta, lever)
-    across = direction_cosine(lever, beta)
+    hj, hk = direction(pj, pk)
+    toward, across = direction(beta, (motor * geometry.gear[limb]) * gamma)
     row = (toward * a, toward * (c * hj) - across * hk, toward * (c * hk) + across * hj)
     # lever · cos ψ = β sin ψ keeps its digits where the lever is long
     entry = motor * (beta * across) + (1.0 - motor) * gamma
@@ -414,9 +398,9 @@ def _with_limb_parameters(geometry, limb, values):  # type: ignore[no-untyped-de
 def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """A_i = d_b e_i, B_i = p + d_p e_i and C_i = B_i − r_i v_i of each limb."""
     k1, k2, k3 = mode.elbows
-    (v11, v12, v13), _ = limb_rows(geometry, 0, k1, x, y, z)
-    (v22, v23, v21), _ = limb_rows(geometry, 1, k2, y, z, x)
-    (v33, v31, v32), _ = limb_rows(geometry, 2, k3, z, x, y)
+    (v11, v12, v13), _, _ = limb_rows(geometry, 0, k1, x, y, z)
+    (v22, v23, v21), _, _ = limb_rows(geometry, 1, k2, y, z, x)
+    (v33, v31, v32), _, _ = limb_rows(geometry, 2, k3, z, x, y)
     b1, b2, b3 = geometry.base
     p1, p2, p3 = geometry.platform
     r1, r2, r3 = geometry.distal
