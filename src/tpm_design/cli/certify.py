@@ -186,7 +186,9 @@ def _largest_text(study: Study, asked_for: Certification, found: LargestToleranc
         for name, (value, unit) in _scaled(study, asked_for, found.factor).items()
     )
     limit = (
-        "nothing larger was tried" if found.failed is None else f"at {found.failed:.4g} times they are {found.outcome}"
+        "nothing larger was tried"
+        if found.failed is None
+        else f"at {found.failed:.4g} times they are {found.outcome}"
     )
     return f"Largest tolerances proved: {proved} ({found.factor:.4g} times the study's; {limit})."
 
