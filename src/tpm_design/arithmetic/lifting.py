@@ -39,10 +39,11 @@ def seeded(values: Any, like: Any) -> Any:
 
 @overload(seeded, jit_options=STRICT, strict=False)
 def _overload_seeded(values: Any, like: Any) -> Any:
-    duals = [
-        f"Dual(values[{i}], ({', '.join(f'same_kind({float(i == j)}, values[0])' for j in range(like.count))},))"
+    slopes = [
+        ", ".join(f"same_kind({float(i == j)}, values[0])" for j in range(like.count))
         for i in range(values.count)
     ]
+    duals = [f"Dual(values[{i}], ({slope},))" for i, slope in enumerate(slopes)]
     return written("seeded", "values, like", f"({', '.join(duals)},)", globals())
 
 

@@ -11,8 +11,9 @@ from tpm_design.certificates.document import FILE, document, write_document
 from tpm_design.certificates.tolerances import LargestTolerance, largest_tolerance
 from tpm_design.certificates.verdict import Requirement, Verdict, verdict
 from tpm_design.checker import check_certificate
-from tpm_design.cli.commands import chosen_design, design_rows, usable_processors
+from tpm_design.cli.commands import chosen_design, usable_processors
 from tpm_design.cli.guard import NOT_PROVED, complain
+from tpm_design.cli.results import design_rows
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
 from tpm_design.problem import Design, Evaluation
@@ -180,7 +181,7 @@ def _scaled(study: Study, asked_for: Certification, factor: float) -> dict[str, 
 
 def _largest_text(study: Study, asked_for: Certification, found: LargestTolerance) -> str:
     if found.factor == 0.0:
-        return "No tolerance can be proved: the requirements are not proved for the exact dimensions either, or only just."
+        return "No tolerance can be proved; `certify` says what fails, or holds only just, without them."
     proved = ", ".join(
         f"{name} ± {value:.4g} {unit}".rstrip()
         for name, (value, unit) in _scaled(study, asked_for, found.factor).items()

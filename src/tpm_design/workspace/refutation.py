@@ -18,9 +18,11 @@ SEGMENTS = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 
 
 @kernel
-def _slacks_at(statement, geometry, nominal, mode, x, y, z):  # type: ignore[no-untyped-def]
+def _refuting_at(statement, geometry, nominal, mode, x, y, z):  # type: ignore[no-untyped-def]
     guide = statements.guide(statement, nominal, mode, (x, y, z), (0.0, 0.0, 0.0))
-    return statements.slacks(statement, geometry, mode, guide, Interval(x, x), Interval(y, y), Interval(z, z))
+    return statements.diagonals(
+        statement, geometry, mode, guide, Interval(x, x), Interval(y, y), Interval(z, z)
+    )
 
 
 @inner
@@ -56,7 +58,7 @@ def _box_within_reach(geometry, mode, box):  # type: ignore[no-untyped-def]
 
 def fails_at(statement: Any, mechanism: Mechanism, mode: Mode, pose: Pose) -> bool:
     """Whether ``statement`` is proved to be false at a pose (m) of this machine."""
-    values = _slacks_at(
+    values = _refuting_at(
         statement, mechanism.enclosed_geometry({}), mechanism.geometry, mode.signs, *map(float, pose)
     )
     negative = [value.hi < 0.0 for value in values]

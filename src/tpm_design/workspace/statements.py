@@ -14,12 +14,13 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from tpm_design.arithmetic import formula, inner, sqr
+from tpm_design.arithmetic import formula, inner, magnitude, sqr
 from tpm_design.arithmetic.algebra import determinant
 from tpm_design.arithmetic.compilation import STRICT
 from tpm_design.arithmetic.dual import componentwise
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.velocity import singular_values
+from tpm_design.workspace.frames import identity_frame
 
 # isort: split
 from numba.cpython.unsafe.tuple import tuple_setitem
@@ -102,6 +103,21 @@ def slacks(statement: Any, geometry: Any, mode: Any, guide: Any, x: Any, y: Any,
     raise NotImplementedError
 
 
+def matrix(statement: Any, geometry: Any, mode: Any, guide: Any, x: Any, y: Any, z: Any) -> Any:
+    """Diagonal and other entries of the matrix that is positive definite where the statement holds."""
+    raise NotImplementedError
+
+
+def matrices(statement: Any, geometry: Any, mode: Any, guide: Any, x: Any, y: Any, z: Any) -> Any:
+    """Two such matrices: one grows with the guide's scale, the other falls."""
+    raise NotImplementedError
+
+
+def diagonals(statement: Any, geometry: Any, mode: Any, guide: Any, x: Any, y: Any, z: Any) -> Any:
+    """Numbers of which a negative one refutes: diagonal entries of matrices, else ``slacks``."""
+    raise NotImplementedError
+
+
 def guide(statement: Any, geometry: Any, mode: Any, centre: Any, half: Any) -> Any:
     """What ``slacks`` needs to know of a box, from its centre and half widths and a geometry of floats."""
     raise NotImplementedError
@@ -128,6 +144,11 @@ def _cross(u: Any, v: Any) -> Any:
 
 
 @register_jitable(**STRICT)
+def _scaled(factors: Any, values: Any) -> Any:
+    return (factors[0] * values[0], factors[1] * values[1], factors[2] * values[2])
+
+
+@register_jitable(**STRICT)
 def _times(factor: Any, rows: Any) -> Any:
     a, b, c = rows
     return (
@@ -138,18 +159,63 @@ def _times(factor: Any, rows: Any) -> Any:
 
 
 @register_jitable(**STRICT)
-def definite(rows: Any, b: Any, of_b: Any, of_rows: Any) -> Any:
-    """Coefficients that are all > 0 just where of_b · diag(b)² + of_rows · A Aᵀ is positive definite: trace,
-    sum of the principal minors of order two, determinant (a symmetric matrix has real eigenvalues, and none
-    is ≤ 0 by Descartes' rule of signs)."""
+def _combined(weights: Any, rows: Any) -> Any:
+    """Σ weights_i · row_i, of floats and rows."""
+    a, b, c = rows
+    return (
+        weights[0] * a[0] + weights[1] * b[0] + weights[2] * c[0],
+        weights[0] * a[1] + weights[1] * b[1] + weights[2] * c[1],
+        weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2],
+    )
+
+
+@register_jitable(**STRICT)
+def _entry(of_b: Any, of_rows: Any, p: Any, q: Any, u: Any, v: Any) -> Any:
+    return of_rows * _dot(p, q) + of_b * _dot(u, v)
+
+
+@register_jitable(**STRICT)
+def in_frame(rows: Any, b: Any, of_b: Any, of_rows: Any, frame: Any) -> Any:
+    """of_b · diag(b)² + of_rows · A Aᵀ seen in a frame: the diagonal, and the entries 12, 13, 23."""
+    f, g, h = frame
+    p, q, r = _combined(f, rows), _combined(g, rows), _combined(h, rows)
+    u = (f[0] * b[0], f[1] * b[1], f[2] * b[2])
+    v = (g[0] * b[0], g[1] * b[1], g[2] * b[2])
+    w = (h[0] * b[0], h[1] * b[1], h[2] * b[2])
+    diagonal = (
+        of_rows * _square(p) + of_b * _square(u),
+        of_rows * _square(q) + of_b * _square(v),
+        of_rows * _square(r) + of_b * _square(w),
+    )
+    others = (
+        _entry(of_b, of_rows, p, q, u, v),
+        _entry(of_b, of_rows, p, r, u, w),
+        _entry(of_b, of_rows, q, r, v, w),
+    )
+    return diagonal, others
+
+
+@register_jitable(**STRICT)
+def dominance(matrix: Any) -> Any:
+    """How far each diagonal entry exceeds the others of its row: all > 0 only where the matrix is positive
+    definite (Gershgorin). Exact to first order where the matrix is the unit matrix at a box's centre."""
+    (s11, s22, s33), (s12, s13, s23) = matrix
+    a, b, c = magnitude(s12), magnitude(s13), magnitude(s23)
+    return s11 - (a + b), s22 - (a + c), s33 - (b + c)
+
+
+@inner
+def frame_of(rows, b, of_b, of_rows):  # type: ignore[no-untyped-def]
+    """The frame in which ``in_frame`` of these floats is nearly the identity."""
     u, v, w = rows
-    s11 = of_b * sqr(b[0]) + of_rows * _square(u)
-    s22 = of_b * sqr(b[1]) + of_rows * _square(v)
-    s33 = of_b * sqr(b[2]) + of_rows * _square(w)
-    s12, s13, s23 = of_rows * _dot(u, v), of_rows * _dot(u, w), of_rows * _dot(v, w)
-    minor12, minor13, minor23 = s11 * s22 - sqr(s12), s11 * s33 - sqr(s13), s22 * s33 - sqr(s23)
-    whole = s33 * minor12 - s11 * sqr(s23) - s22 * sqr(s13) + 2.0 * (s12 * (s13 * s23))
-    return s11 + s22 + s33, minor12 + minor13 + minor23, whole
+    return identity_frame(
+        of_b * b[0] * b[0] + of_rows * _square(u),
+        of_b * b[1] * b[1] + of_rows * _square(v),
+        of_b * b[2] * b[2] + of_rows * _square(w),
+        of_rows * _dot(u, v),
+        of_rows * _dot(u, w),
+        of_rows * _dot(v, w),
+    )
 
 
 @formula(guide, Reach)
@@ -157,10 +223,7 @@ def definite(rows: Any, b: Any, of_b: Any, of_rows: Any) -> Any:
 @formula(guide, Regular)
 @formula(guide, Serial)
 @formula(guide, Frobenius)
-@formula(guide, Slowest)
-@formula(guide, Fastest)
 @formula(guide, Transmission)
-@formula(guide, Sensitivity)
 def _no_guide(statement, geometry, mode, centre, half):  # type: ignore[no-untyped-def]
     return 0.0
 
@@ -193,7 +256,32 @@ def _condition_guide(statement, geometry, mode, centre, half):  # type: ignore[n
         _gains(statement, geometry, mode, centre, 1),
         _gains(statement, geometry, mode, centre, 2),
     )
-    return at_centre, centre, slopes, parameters, gains
+    rows, b, _ = equations.unit_velocity_map(geometry, mode, statement.motor, x, y, z)
+    lower = frame_of(rows, b, 1.0, -statement.floor * statement.floor * at_centre)
+    upper = frame_of(rows, b, -1.0, at_centre)
+    return (at_centre, centre, slopes, parameters, gains), lower, upper
+
+
+@formula(guide, Slowest)
+def _slowest_guide(statement, geometry, mode, centre, half):  # type: ignore[no-untyped-def]
+    x, y, z = centre
+    rows, b, _ = equations.unit_velocity_map(geometry, mode, statement.motor, x, y, z)
+    return frame_of(_times(statement.floor, rows), b, 1.0, -1.0)
+
+
+@formula(guide, Fastest)
+def _fastest_guide(statement, geometry, mode, centre, half):  # type: ignore[no-untyped-def]
+    x, y, z = centre
+    rows, b, _ = equations.unit_velocity_map(geometry, mode, statement.motor, x, y, z)
+    return frame_of(_times(statement.ceiling, rows), b, -1.0, 1.0)
+
+
+@formula(guide, Sensitivity)
+def _sensitivity_guide(statement, geometry, mode, centre, half):  # type: ignore[no-untyped-def]
+    x, y, z = centre
+    rows, _, factors = equations.unit_velocity_map(geometry, mode, statement.motor, x, y, z)
+    gains = equations.length_error_gains(geometry, mode, x, y, z)
+    return frame_of(_times(statement.ceiling, rows), _scaled(factors, gains), -1.0, 1.0)
 
 
 @inner
@@ -271,32 +359,32 @@ def _frobenius(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-un
     return (9.0 * sqr(volume * (p * q * r)) - statement.floor * (statement.floor * (forward * backward)),)
 
 
-@formula(slacks, Condition)
+@formula(matrices, Condition)
 def _condition(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
     rows, b, _ = equations.unit_velocity_map(geometry, mode, statement.motor, x, y, z)
-    scale = guide_value(guide, geometry, x, y, z)
+    linear, lower_frame, upper_frame = guide
+    scale = guide_value(linear, geometry, x, y, z)
     lower = statement.floor * (statement.floor * scale)
-    return definite(rows, b, 1.0, -lower) + definite(rows, b, -1.0, scale)
+    return in_frame(rows, b, 1.0, -lower, lower_frame), in_frame(rows, b, -1.0, scale, upper_frame)
 
 
-@formula(slacks, Slowest)
+@formula(matrix, Slowest)
 def _slowest(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
     rows, b, _ = equations.unit_velocity_map(geometry, mode, statement.motor, x, y, z)
-    return definite(_times(statement.floor, rows), b, 1.0, -1.0)
+    return in_frame(_times(statement.floor, rows), b, 1.0, -1.0, guide)
 
 
-@formula(slacks, Fastest)
+@formula(matrix, Fastest)
 def _fastest(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
     rows, b, _ = equations.unit_velocity_map(geometry, mode, statement.motor, x, y, z)
-    return definite(_times(statement.ceiling, rows), b, -1.0, 1.0)
+    return in_frame(_times(statement.ceiling, rows), b, -1.0, 1.0, guide)
 
 
-@formula(slacks, Sensitivity)
+@formula(matrix, Sensitivity)
 def _sensitivity(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
     rows, _, factors = equations.unit_velocity_map(geometry, mode, statement.motor, x, y, z)
     gains = equations.length_error_gains(geometry, mode, x, y, z)
-    scaled = (factors[0] * gains[0], factors[1] * gains[1], factors[2] * gains[2])
-    return definite(_times(statement.ceiling, rows), scaled, -1.0, 1.0)
+    return in_frame(_times(statement.ceiling, rows), _scaled(factors, gains), -1.0, 1.0, guide)
 
 
 @formula(slacks, Transmission)
@@ -309,3 +397,39 @@ def _transmission(statement, geometry, mode, guide, x, y, z):  # type: ignore[no
     second = volume - statement.floor * (statement.floor * (_square(b) * _square(_cross(c, a))))
     third = volume - statement.floor * (statement.floor * (_square(c) * _square(_cross(a, b))))
     return (*entering, first, second, third)
+
+
+@formula(slacks, Slowest)
+@formula(slacks, Fastest)
+@formula(slacks, Sensitivity)
+def _one_matrix(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
+    return dominance(matrix(statement, geometry, mode, guide, x, y, z))
+
+
+@formula(slacks, Condition)
+def _two_matrices(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
+    first, second = matrices(statement, geometry, mode, guide, x, y, z)
+    return dominance(first) + dominance(second)
+
+
+@formula(diagonals, Slowest)
+@formula(diagonals, Fastest)
+@formula(diagonals, Sensitivity)
+def _diagonal(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
+    return matrix(statement, geometry, mode, guide, x, y, z)[0]
+
+
+@formula(diagonals, Condition)
+def _two_diagonals(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
+    first, second = matrices(statement, geometry, mode, guide, x, y, z)
+    return first[0] + second[0]
+
+
+@formula(diagonals, Reach)
+@formula(diagonals, Determinant)
+@formula(diagonals, Regular)
+@formula(diagonals, Serial)
+@formula(diagonals, Frobenius)
+@formula(diagonals, Transmission)
+def _slacks_themselves(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
+    return slacks(statement, geometry, mode, guide, x, y, z)
