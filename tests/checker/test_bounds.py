@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,11 @@ import pytest
 from flint import arb
 from numba import njit
 
-from tpm_design.checker.balls import Enclosure
+from tpm_design.checker.balls import Enclosure, Symmetric, congruent, constant, full, positive_definite
 from tpm_design.checker.claims import Machine
 from tpm_design.checker.proof import Machines, all_positive, graded, natural, spans_of
 from tpm_design.checker.regions import Box, Domain, Region
-from tpm_design.checker.spectrum import eigenpairs, singular_pairs
+from tpm_design.checker.spectrum import eigenpairs, singular_pairs, unit_frame
 from tpm_design.checker.statements import (
     Condition,
     Determinant,
@@ -28,6 +29,7 @@ from tpm_design.checker.statements import (
     Statement,
     Transmission,
 )
+from tpm_design.checker.uru import Configuration
 from tpm_design.mechanisms import mechanism_kind
 from tpm_design.workspace.indices import (
     CONDITION_2,
@@ -52,7 +54,7 @@ LIMITS = {"theta1": (-2.0, 2.6), "theta2": (-1.5, 3.5), "theta3": (-2.9, 2.9), "
 def random_machine(random: np.random.Generator, limits: dict[str, Any]) -> Machine:
     signs = ["".join(random.choice(["+", "-"], 3)) for _ in range(2)]
     values: dict[str, list[float]] = {
-        "db": random.uniform(0.0, 0.3, 3).tolist(),
+        "db": random.uniform(0.01, 0.3, 3).tolist(),
         "dp": random.uniform(0.0, 0.2, 3).tolist(),
         "f": random.uniform(0.4, 0.8, 3).tolist(),
         "r": random.uniform(0.4, 0.8, 3).tolist(),
@@ -144,7 +146,7 @@ def test_balls_hold_the_values_of_machines_and_poses_within(half: float) -> None
         box = around(poses[0], half)
         machines = machine.within_tolerance()
         spans = spans_of(machines, box)
-        whole, slopes = natural(machines, spans), graded(machines, spans)
+        whole, (slopes, _) = natural(machines, spans), graded(machines, spans)
         tolerances = machine.tolerances()
         for _ in range(4):
             parameters = {
@@ -177,13 +179,13 @@ def test_slopes_hold_the_differences_between_any_two_points() -> None:
             continue
         machines = machine.within_tolerance()
         spans = spans_of(machines, around(poses[0], 5e-3))
-        slopes = graded(machines, spans)
+        slopes, _ = graded(machines, spans)
         ends = []
         for _ in range(2):
             share = {name: arb(random.uniform(0.0, 1.0)) for name in spans}
             ends.append({n: s.low + share[n] * (s.high - s.low) for n, s in spans.items()})
         first, second = (
-            type(slopes)(machines.mode, machines.limits, {n: Enclosure(v, {}) for n, v in end.items()})
+            Configuration(machines.mode, machines.limits, {n: Enclosure(v, {}) for n, v in end.items()})
             for end in ends
         )
         for name, quantity in quantities(machines).items():
@@ -332,3 +334,72 @@ def test_eigenvalues_and_singular_values_are_those_of_lapack() -> None:
         values = np.linalg.svd(jacobian, compute_uv=False)[::-1] ** 2
         found = singular_pairs(matrix.tolist(), b.tolist())
         assert [value for value, _, _ in found] == pytest.approx(values.tolist(), rel=1e-6)
+
+
+def test_a_symmetric_matrix_is_told_to_be_positive_definite_exactly_when_it_is() -> None:
+    random = np.random.default_rng(12)
+    for _ in range(200):
+        matrix = random.normal(size=(3, 3))
+        matrix = matrix + matrix.T + random.uniform(-1.0, 6.0) * np.eye(3)
+        entries = [float(matrix[place]) for place in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]
+        p, q, r, u, v, w = (constant(arb(entry)) for entry in entries)
+        symmetric = Symmetric((p, q, r), (u, v, w))
+        assert [[float(entry.value) for entry in row] for row in full(symmetric)] == matrix.tolist()
+        definite = bool(np.linalg.eigvalsh(matrix).min() > 0.0)
+        frame = unit_frame(matrix.tolist())
+        assert positive_definite(symmetric) == definite == (frame is not None)
+        if frame is not None:
+            turned = congruent([[arb(part) for part in row] for row in frame], [arb(e) for e in entries])
+            unit = np.asarray(frame) @ matrix @ np.asarray(frame).T
+            assert unit == pytest.approx(np.eye(3), abs=1e-6)
+            assert [float(part) for part in turned] == pytest.approx([1, 1, 1, 0, 0, 0], abs=1e-6)
+
+
+def test_conditioning_is_proved_close_to_its_least_value_for_every_machine_within_tolerance() -> None:
+    """At a corner of a cube, where two singular values are equal and each machine parts them otherwise."""
+    sizes = {"db": 0.18578, "dp": 0.06, "f": 0.23051, "r": 0.17549, "k": 1.0}
+    nominal = {name: (value, value, value) for name, value in sizes.items()}
+    machine = Machine(nominal, {"db": 1e-4, "f": 1e-4, "r": 1e-4}, {}, "+++", "+++")
+    pose = np.full(3, 0.2549)
+    least = 1.0
+    for signs in itertools.product((-1e-4, 1e-4), repeat=9):
+        moved = dict(zip(("db", "f", "r"), np.reshape(signs, (3, 3)), strict=True))
+        worst = {name: np.add(nominal[name], moved.get(name, 0.0)).tolist() for name in nominal}
+        built = mechanism_kind("uru").build(worst, {})
+        mode = built.mode_of({"octant": "+++", "elbows": "+++"})
+        values = index_values(built.geometry, mode.signs, Index(CONDITION_2), pose.reshape(1, 3))
+        least = min(least, float(values[0]))
+    machines = machine.within_tolerance()
+    spans = spans_of(machines, around(pose, 1e-6))
+    assert all_positive(Condition("motor", 0.985 * least), machines, spans)
+    assert not all_positive(Condition("motor", least * (1.0 + 1e-6)), machines, spans)
+
+
+@pytest.mark.parametrize(("statement", "index", "rising"), CASES)
+def test_what_is_proved_on_a_box_holds_at_poses_and_machines_within(
+    statement: Any, index: Index, rising: bool
+) -> None:
+    random = np.random.default_rng(13)
+    proofs = 0
+    while proofs < 12:
+        machine = random_machine(random, {})
+        built, mode, poses = reachable_pose(random, machine)
+        if len(poses) == 0:
+            continue
+        value = float(index_values(built.geometry, mode.signs, index, poses[:1])[0])
+        bound = value * float(random.uniform(0.7, 1.0) if rising else random.uniform(1.0, 1.4))
+        half = float(random.choice([1e-4, 1e-3, 4e-3]))
+        machines = machine.within_tolerance()
+        if not all_positive(statement(bound), machines, spans_of(machines, around(poses[0], half))):
+            continue
+        proofs += 1
+        tolerances = machine.tolerances()
+        for _ in range(6):
+            within = {
+                name: np.add(values, np.multiply(tolerances[name], random.uniform(-1.0, 1.0, 3))).tolist()
+                for name, values in machine.parameters.items()
+            }
+            other = mechanism_kind("uru").build(within, {})
+            near = poses[0] + half * random.uniform(-1.0, 1.0, (50, 3))
+            found = index_values(other.geometry, mode.signs, index, near)
+            assert (found >= bound).all() if rising else (found <= bound).all()
