@@ -194,30 +194,34 @@ class Symmetric(NamedTuple):
     beside: Triple
 
 
-def trace(matrix: Symmetric) -> Enclosure:
-    p, q, r = matrix.diagonal
-    return p + q + r
-
-
-def principal_minors(matrix: Symmetric) -> Enclosure:
-    """The sum of the three principal minors of size 2."""
-    p, q, r = (entry.value for entry in matrix.diagonal)
-    u, v, w = (entry.value for entry in matrix.beside)
-    partials = (q + r, r + p, p + q, -2 * u, -2 * v, -2 * w)
-    value = q * r - u * u + r * p - v * v + p * q - w * w
-    return chained(value, zip(partials, (*matrix.diagonal, *matrix.beside), strict=True))
-
-
-def symmetric_determinant(matrix: Symmetric) -> Enclosure:
-    """Its derivative in an entry is that entry's cofactor, twice beside the diagonal."""
+def positive_definite(matrix: Symmetric) -> bool:
+    """Whether all eigenvalues are > 0, whatever the entries are: by the characteristic polynomial."""
     p, q, r = (entry.value for entry in matrix.diagonal)
     u, v, w = (entry.value for entry in matrix.beside)
     first, second, third = q * r - u * u, r * p - v * v, p * q - w * w
-    fourth, fifth, sixth = v * w - u * p, w * u - v * q, u * v - w * r
-    value = p * first + w * sixth + v * fifth
-    partials = (first, second, third, 2 * fourth, 2 * fifth, 2 * sixth)
-    return chained(value, zip(partials, (*matrix.diagonal, *matrix.beside), strict=True))
+    determinant = p * first + w * (u * v - w * r) + v * (w * u - v * q)
+    return bool(p + q + r > 0 and first + second + third > 0 and determinant > 0)
 
 
-POSITIVE_DEFINITE = (trace, principal_minors, symmetric_determinant)
-"""The coefficients of the characteristic polynomial: all eigenvalues are > 0 where all three are."""
+def full(matrix: Symmetric) -> list[list[Enclosure]]:
+    """Its three rows."""
+    (p, q, r), (u, v, w) = matrix
+    return [[p, w, v], [w, q, u], [v, u, r]]
+
+
+def congruent(lower: Sequence[Sequence[arb]], entries: Sequence[arb]) -> list[arb]:
+    """P M Pᵀ of a lower triangular P and a symmetric M, given and returned as entries 11, 22, 33, 23, 31,
+    12."""
+    (a, _, _), (b, c, _), (d, e, f) = lower
+    p, q, r, u, v, w = entries
+    # rows of P M
+    second = (b * p + c * w, b * w + c * q, b * v + c * u)
+    third = (d * p + e * w + f * v, d * w + e * q + f * u, d * v + e * u + f * r)
+    return [
+        a * a * p,
+        b * second[0] + c * second[1],
+        d * third[0] + e * third[1] + f * third[2],
+        b * third[0] + c * third[1],
+        a * third[0],
+        a * second[0],
+    ]

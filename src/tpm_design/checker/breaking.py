@@ -122,12 +122,12 @@ def _short(requirement: Requirement, bound: float, at: Configuration) -> bool:
     if metric == "boundary_distance":
         return any((at.leg_margins(limb)[end].value < bound) for limb in LIMBS for end in (0, 1))
     if metric == "singularity_margin_min":
-        missed = _missed(Serial(bound).goals(at), at)
+        missed = _missed(Serial(bound).goals(at).quantities, at)
         return missed or any(abs(at.unit_determinant(name).value) < bound for name in DETERMINANTS)
     if metric == "transmission_min":
-        return _missed(Transmission(bound).goals(at), at)
+        return _missed(Transmission(bound).goals(at).quantities, at)
     if metric == "conditioning_min" and requirement.options["norm"] == "frobenius":
-        return _missed(Frobenius(drive, bound).goals(at), at)
+        return _missed(Frobenius(drive, bound).goals(at).quantities, at)
     if metric == "coverage":
         return False
     # in the directions of least and greatest gain: B² u against σ² A Aᵀ u

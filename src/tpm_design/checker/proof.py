@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from flint import arb
 
-from tpm_design.checker.balls import Enclosure
+from tpm_design.checker.balls import ZERO, Enclosure, congruent, full, positive_definite
 from tpm_design.checker.regions import Box, Domain
-from tpm_design.checker.statements import Goal, Locus, Reach, Statement, outside_goals
+from tpm_design.checker.spectrum import unit_frame
+from tpm_design.checker.statements import Goal, Locus, Reach, Statement, SymmetricGoal, outside_goals
 from tpm_design.checker.uru import AXES, LIMBS, Configuration, JointRange, Mode
 
 ONE = arb(1)
@@ -29,6 +30,9 @@ class Span:
         self.radius = (self.whole - self.centre).abs_upper()
 
 
+Spans = Mapping[str, Span]
+
+
 @dataclass(frozen=True)
 class Machines:
     """Every machine within the tolerance: the spans of its sizes, ``delta1`` … ``k3``."""
@@ -38,22 +42,22 @@ class Machines:
     sizes: Mapping[str, Span]
 
 
-def natural(machines: Machines, spans: Mapping[str, Span]) -> Configuration:
+def natural(machines: Machines, spans: Spans) -> Configuration:
     variables = {name: Enclosure(span.whole, {}) for name, span in spans.items()}
     return Configuration(machines.mode, machines.limits, variables)
 
 
-def graded(machines: Machines, spans: Mapping[str, Span]) -> Configuration:
+def graded(machines: Machines, spans: Spans) -> tuple[Configuration, Configuration]:
     """With derivatives in everything that varies, and the configuration in the middle."""
     centre = {name: Enclosure(span.centre, {}) for name, span in spans.items()}
     middle = Configuration(machines.mode, machines.limits, centre)
     variables = {
         name: Enclosure(span.whole, {name: ONE} if span.radius > 0 else {}) for name, span in spans.items()
     }
-    return Configuration(machines.mode, machines.limits, variables, middle)
+    return Configuration(machines.mode, machines.limits, variables, middle), middle
 
 
-def positive(goal: Goal, slopes: Configuration, machines: Machines, spans: Mapping[str, Span]) -> bool:
+def positive(goal: Goal, slopes: Configuration, machines: Machines, spans: Spans) -> bool:
     """Whether a goal is > 0 on the whole box, by its derivatives there.
 
     A variable in which the goal rises or falls takes the end where it is least; the others take their middle
@@ -76,18 +80,49 @@ def positive(goal: Goal, slopes: Configuration, machines: Machines, spans: Mappi
     return bool(goal(Configuration(machines.mode, machines.limits, variables)).value - loss > 0)
 
 
-def all_positive(statement: Statement, machines: Machines, spans: Mapping[str, Span]) -> bool:
+def definite(goal: SymmetricGoal, slopes: Configuration, middle: Configuration, spans: Spans) -> bool:
+    """Whether all eigenvalues of a matrix are > 0 on the whole box, by its derivatives there.
+
+    P M Pᵀ is near the unit matrix for the P that makes it so in the middle, which is chosen in plain numbers;
+    by the mean value theorem its entries stay close, and by Gershgorin's its eigenvalues do.
+    """
+    centre = goal(middle)
+    frame = unit_frame([[float(entry.value) for entry in row] for row in full(centre)])
+    if frame is None:
+        return False
+    factors = [[arb(part) for part in row] for row in frame]
+    moved: dict[str, list[arb]] = {}
+    over = goal(slopes)
+    for place, entry in enumerate((*over.diagonal, *over.beside)):
+        for name, part in entry.slope.items():
+            moved.setdefault(name, [ZERO] * 6)[place] = part
+    at = congruent(factors, [entry.value for entry in (*centre.diagonal, *centre.beside)])
+    spread = [ZERO] * 6
+    for name, parts in moved.items():
+        radius = spans[name].radius
+        turned = congruent(factors, parts)
+        spread = [total + part.abs_upper() * radius for total, part in zip(spread, turned, strict=True)]
+    beside = [abs(at[n]) + spread[n] for n in (3, 4, 5)]
+    return all(at[n] - spread[n] - beside[(n + 1) % 3] - beside[(n + 2) % 3] > 0 for n in LIMBS)
+
+
+def all_positive(statement: Statement, machines: Machines, spans: Spans) -> bool:
+    """Whether a statement holds on a box, by its bounds there."""
     whole = natural(machines, spans)
-    if all(goal(whole).value > 0 for goal in statement.goals(whole)):
+    goals = statement.goals(whole)
+    if all(goal(whole).value > 0 for goal in goals.quantities) and all(
+        positive_definite(matrix(whole)) for matrix in goals.matrices
+    ):
         return True
-    slopes = graded(machines, spans)
+    slopes, middle = graded(machines, spans)
     # goals of one configuration belong together: they may share a scale
+    goals = statement.goals(slopes)
     return all(
-        goal(whole).value > 0 or positive(goal, slopes, machines, spans) for goal in statement.goals(slopes)
-    )
+        goal(whole).value > 0 or positive(goal, slopes, machines, spans) for goal in goals.quantities
+    ) and all(definite(matrix, slopes, middle, spans) for matrix in goals.matrices)
 
 
-def out_of_reach(machines: Machines, box: Box, spans: Mapping[str, Span]) -> bool:
+def out_of_reach(machines: Machines, box: Box, spans: Spans) -> bool:
     """Whether one margin of reach or of the mode is < 0 on the whole box for every machine."""
     for (low, high), side in zip(box, machines.mode.octant, strict=True):
         if (side > 0 and high < 0.0) or (side < 0 and low > 0.0):
@@ -96,7 +131,7 @@ def out_of_reach(machines: Machines, box: Box, spans: Mapping[str, Span]) -> boo
     goals = outside_goals(whole)
     if any(goal(whole).value > 0 for goal in goals):
         return True
-    slopes = graded(machines, spans)
+    slopes, _ = graded(machines, spans)
     return any(positive(goal, slopes, machines, spans) for goal in goals)
 
 

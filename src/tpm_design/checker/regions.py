@@ -68,8 +68,8 @@ class Domain:
         return bool(total > distance**2)
 
     def _outside_ellipsoid(self, box: Box, gaps: Sequence[arb]) -> bool:
-        """By a plane between the box and the ellipsoid grown by the distance: in the direction n the
-        ellipsoid ends at n·c + |diag(half) n|."""
+        """By a plane between the box and the ellipsoid grown by the distance: in the direction n of
+        length 1 that ends at n·c + |diag(half) n| + distance."""
         total = arb(0)
         for gap, half in zip(gaps, self.body.half, strict=True):
             total += (gap / half) ** 2
@@ -77,9 +77,21 @@ class Domain:
             return False
         if self.distance == 0.0:
             return True
-        normal = self._toward(box)
-        if normal is None:
-            return False
+        centre = self.body.centre
+        foot = centre
+        for _ in range(PROJECTIONS):
+            # from the box to the ellipsoid and back: in the end, from nearest point to nearest point
+            near = [min(high, max(low, at)) for (low, high), at in zip(box, foot, strict=True)]
+            away = nearest_on_ellipsoid(self.body.half, [a - c for a, c in zip(near, centre, strict=True)])
+            foot = (centre[0] + away[0], centre[1] + away[1], centre[2] + away[2])
+            if math.dist(near, foot) <= self.distance:
+                return False
+            if self._parted(box, [a - b for a, b in zip(near, foot, strict=True)]):
+                return True
+        return False
+
+    def _parted(self, box: Box, normal: Sequence[float]) -> bool:
+        """Whether a plane across ``normal`` lies between a box and the ellipsoid grown by the distance."""
         near, length, support = arb(0), arb(0), arb(0)
         for (low, high), centre, half, part in zip(
             box, self.body.centre, self.body.half, normal, strict=True
@@ -89,18 +101,6 @@ class Domain:
             length += arb(part) ** 2
             support += (arb(half) * arb(part)) ** 2
         return bool(near - support.sqrt() > arb(self.distance) * length.sqrt())
-
-    def _toward(self, box: Box) -> Point | None:
-        """Direction from the ellipsoid's point nearest to a box to the box, by projecting in turns."""
-        centre, half = self.body.centre, self.body.half
-        foot = centre
-        for _ in range(PROJECTIONS):
-            near = tuple(min(high, max(low, at)) for (low, high), at in zip(box, foot, strict=True))
-            away = nearest_on_ellipsoid(half, [a - c for a, c in zip(near, centre, strict=True)])
-            foot = (centre[0] + away[0], centre[1] + away[1], centre[2] + away[2])
-        gap = tuple(a - b for a, b in zip(near, foot, strict=True))
-        size = math.hypot(*gap)
-        return (gap[0] / size, gap[1] / size, gap[2] / size) if size > 0.0 else None
 
     def bounds(self) -> list[tuple[Fraction, Fraction]]:
         """The bounding box, exactly."""

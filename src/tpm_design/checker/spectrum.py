@@ -59,3 +59,20 @@ def singular_pairs(rows: Sequence[Row], b: Row) -> list[tuple[float, Vector, Vec
 
 def tuple_of(x: float, y: float, z: float) -> Vector:
     return x, y, z
+
+
+def unit_frame(matrix: Sequence[Row]) -> tuple[Vector, Vector, Vector] | None:
+    """The lower triangular P with P M Pᵀ = 1, None where M has none: the inverse of Cholesky's factor."""
+    (p, _, _), (w, q, _), (v, u, r) = matrix
+    try:
+        l11 = math.sqrt(p)
+        l21, l31 = w / l11, v / l11
+        l22 = math.sqrt(q - l21 * l21)
+        l32 = (u - l31 * l21) / l22
+        l33 = math.sqrt(r - l31 * l31 - l32 * l32)
+        a, c, f = 1.0 / l11, 1.0 / l22, 1.0 / l33
+    except (ValueError, ZeroDivisionError):
+        return None
+    b, e = -l21 * a * c, -l32 * c * f
+    frame = (a, 0.0, 0.0), (b, c, 0.0), (-(l31 * a + l32 * b) * f, e, f)
+    return frame if all(math.isfinite(part) for row in frame for part in row) else None

@@ -1,19 +1,18 @@
 """What a certificate states, as inequalities between quantities of a configuration.
 
-A statement holds on a box where each of its goals is > 0 on all of it.
+A statement holds on a box where each of its goals is met on all of it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from typing import NamedTuple
 
 from flint import arb
 
 from tpm_design.checker.balls import (
-    POSITIVE_DEFINITE,
     Enclosure,
     Symmetric,
     constant,
@@ -27,6 +26,16 @@ from tpm_design.checker.spectrum import singular_pairs
 from tpm_design.checker.uru import LIMBS, Configuration, Velocity
 
 Goal = Callable[[Configuration], Enclosure]
+SymmetricGoal = Callable[[Configuration], Symmetric]
+
+
+class Goals(NamedTuple):
+    """Quantities that are > 0 and symmetric matrices of which all eigenvalues are > 0."""
+
+    quantities: Sequence[Goal] = ()
+    matrices: Sequence[SymmetricGoal] = ()
+
+
 DETERMINANTS = ("translation", "actuation", "rotation")
 NINE = arb(9)
 
@@ -37,14 +46,14 @@ class Reach:
 
     floor: float
 
-    def goals(self, configuration: Configuration) -> list[Goal]:
+    def goals(self, configuration: Configuration) -> Goals:
         margin = constant(arb(self.floor))
         legs: list[Goal] = [
             lambda at, limb=limb, side=side: at.leg_margins(limb)[side] - margin  # type: ignore[misc]
             for limb in LIMBS
             for side in (0, 1)
         ]
-        return legs + limit_goals(configuration)
+        return Goals([*legs, *limit_goals(configuration)])
 
 
 def limit_goals(configuration: Configuration) -> list[Goal]:
@@ -79,9 +88,9 @@ class Determinant:
     sign: int
     floor: float
 
-    def goals(self, _: Configuration) -> list[Goal]:
+    def goals(self, _: Configuration) -> Goals:
         sign, floor = arb(self.sign), constant(arb(self.floor))
-        return [lambda at: at.unit_determinant(self.name).times(sign) - floor]
+        return Goals([lambda at: at.unit_determinant(self.name).times(sign) - floor])
 
 
 @dataclass(frozen=True)
@@ -90,12 +99,14 @@ class Serial:
 
     floor: float
 
-    def goals(self, _: Configuration) -> list[Goal]:
+    def goals(self, _: Configuration) -> Goals:
         least = constant(arb(self.floor) ** 2)
-        return [
-            lambda at, limb=limb: at.elbow_sine_squared(limb) - least  # type: ignore[misc]
-            for limb in LIMBS
-        ]
+        return Goals(
+            [
+                lambda at, limb=limb: at.elbow_sine_squared(limb) - least  # type: ignore[misc]
+                for limb in LIMBS
+            ]
+        )
 
 
 @dataclass(frozen=True)
@@ -105,7 +116,7 @@ class Frobenius:
     drive: str
     floor: float
 
-    def goals(self, _: Configuration) -> list[Goal]:
+    def goals(self, _: Configuration) -> Goals:
         least = arb(self.floor) ** 2
 
         def goal(at: Configuration) -> Enclosure:
@@ -117,7 +128,7 @@ class Frobenius:
             backward = first + second + third
             return square(determinant(rows)).times(NINE) - (forward * backward).times(least)
 
-        return [goal]
+        return Goals([goal])
 
 
 def gram(velocity: Velocity) -> Symmetric:
@@ -140,14 +151,6 @@ def negative(matrix: Symmetric) -> Symmetric:
     return Symmetric((-p, -q, -r), (-u, -v, -w))
 
 
-def positive_definite(matrix: Callable[[Configuration], Symmetric]) -> list[Goal]:
-    known = lru_cache(maxsize=2)(matrix)  # one configuration is asked for all three coefficients
-    return [
-        lambda at, coefficient=coefficient: coefficient(known(at))  # type: ignore[misc]
-        for coefficient in POSITIVE_DEFINITE
-    ]
-
-
 @dataclass(frozen=True)
 class Slowest:
     """σ_min(J) ≥ floor, as B² − floor² A Aᵀ ≻ 0."""
@@ -155,9 +158,9 @@ class Slowest:
     drive: str
     floor: float
 
-    def goals(self, _: Configuration) -> list[Goal]:
+    def goals(self, _: Configuration) -> Goals:
         scale = constant(arb(self.floor) ** 2)
-        return positive_definite(lambda at: squared_less_gram(at.velocity(self.drive), scale))
+        return Goals(matrices=[lambda at: squared_less_gram(at.velocity(self.drive), scale)])
 
 
 @dataclass(frozen=True)
@@ -167,9 +170,9 @@ class Fastest:
     drive: str
     ceiling: float
 
-    def goals(self, _: Configuration) -> list[Goal]:
+    def goals(self, _: Configuration) -> Goals:
         scale = constant(arb(self.ceiling) ** 2)
-        return positive_definite(lambda at: negative(squared_less_gram(at.velocity(self.drive), scale)))
+        return Goals(matrices=[lambda at: negative(squared_less_gram(at.velocity(self.drive), scale))])
 
 
 @dataclass(frozen=True)
@@ -198,18 +201,17 @@ class Condition:
     drive: str
     floor: float
 
-    def goals(self, configuration: Configuration) -> list[Goal]:
+    def goals(self, configuration: Configuration) -> Goals:
         scale = self.scale(configuration)
         if scale is None:
-            return [lambda _: constant(arb(-1))]
+            return Goals([lambda _: constant(arb(-1))])
         least = arb(self.floor) ** 2
-        below = positive_definite(
-            lambda at: squared_less_gram(at.velocity(self.drive), scale.at(at).times(least))
+        return Goals(
+            matrices=[
+                lambda at: negative(squared_less_gram(at.velocity(self.drive), scale.at(at))),
+                lambda at: squared_less_gram(at.velocity(self.drive), scale.at(at).times(least)),
+            ]
         )
-        above = positive_definite(
-            lambda at: negative(squared_less_gram(at.velocity(self.drive), scale.at(at)))
-        )
-        return above + below
 
     def scale(self, configuration: Configuration) -> Scale | None:
         """With slopes where the configuration has them; None at a singularity, where there is no scale."""
@@ -248,7 +250,7 @@ class Transmission:
 
     floor: float
 
-    def goals(self, configuration: Configuration) -> list[Goal]:
+    def goals(self, configuration: Configuration) -> Goals:
         least = arb(self.floor) ** 2
 
         def output(at: Configuration, limb: int) -> Enclosure:
@@ -257,7 +259,7 @@ class Transmission:
             return square(determinant(rows)) - across.times(least)
 
         outputs: list[Goal] = [lambda at, limb=limb: output(at, limb) for limb in LIMBS]  # type: ignore[misc]
-        return Serial(self.floor).goals(configuration) + outputs
+        return Goals([*Serial(self.floor).goals(configuration).quantities, *outputs])
 
 
 @dataclass(frozen=True)
@@ -267,7 +269,7 @@ class Sensitivity:
     drive: str
     ceiling: float
 
-    def goals(self, _: Configuration) -> list[Goal]:
+    def goals(self, _: Configuration) -> Goals:
         scale = arb(self.ceiling) ** 2
 
         def matrix(at: Configuration) -> Symmetric:
@@ -278,7 +280,7 @@ class Sensitivity:
                 (u.times(scale), v.times(scale), w.times(scale)),
             )
 
-        return positive_definite(matrix)
+        return Goals(matrices=[matrix])
 
 
 @dataclass(frozen=True)
@@ -288,10 +290,10 @@ class Locus:
     name: str
     distance: float
 
-    def goals(self, configuration: Configuration) -> list[Goal]:
+    def goals(self, configuration: Configuration) -> Goals:
         # on a box the determinant keeps the sign it has in the middle, or is not proved to be away from 0
         middle = arb(1) if float(configuration.unit_determinant(self.name).value) >= 0.0 else arb(-1)
-        return [lambda at: at.unit_determinant(self.name).times(middle)]
+        return Goals([lambda at: at.unit_determinant(self.name).times(middle)])
 
 
 @dataclass(frozen=True)
