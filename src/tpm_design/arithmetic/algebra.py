@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from tpm_design.arithmetic import kernel_cache  # noqa: F401  (before Numba)
-
-# isort: split
-from numba.extending import register_jitable
-
-from tpm_design.arithmetic.compilation import FAST
+from tpm_design.arithmetic.functions import scalar_function
 
 
-@register_jitable(**FAST)
+def _expanded(
+    a11: Any, a12: Any, a13: Any, a21: Any, a22: Any, a23: Any, a31: Any, a32: Any, a33: Any
+) -> Any:
+    return a11 * (a22 * a33 - a23 * a32) - a12 * (a21 * a33 - a23 * a31) + a13 * (a21 * a32 - a22 * a31)
+
+
+@scalar_function(intervals=_expanded, duals=_expanded)
 def determinant(
     a11: Any, a12: Any, a13: Any, a21: Any, a22: Any, a23: Any, a31: Any, a32: Any, a33: Any
 ) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,15 @@ class Mechanism(ABC):
     @abstractmethod
     def mode_of(self, signs: Mapping[str, str]) -> Mode:
         """The working mode named by sign strings, e.g. ``{"octant": "+++", "elbows": "+-+"}``."""
+
+    @abstractmethod
+    def enclosed_geometry(self, tolerance: Mapping[str, float] = MappingProxyType({})) -> Any:
+        """The geometry made of Intervals that hold every machine whose parameters are within ± ``tolerance``
+        (name → SI value) of this one's."""
+
+    def single_octants(self, mode: Mode) -> tuple[Mode, ...]:
+        """Modes that make up ``mode`` between coordinate planes no aspect crosses; itself if there are none."""
+        return (mode,)
 
     @abstractmethod
     def reach_radius(self) -> float:

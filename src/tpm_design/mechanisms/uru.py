@@ -19,6 +19,7 @@ from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
 from tpm_design.arithmetic import (
+    Interval,
     arctangent2,
     cosine,
     direction_cosine,
@@ -449,6 +450,32 @@ class Uru(Mechanism):
         values = mode_signs(self.kind, signs)
         label = " ".join(signs[field.name] for field in self.kind.mode_fields)
         return Mode(label, UruSigns(octant=values["octant"], elbows=values["elbows"]))
+
+    def enclosed_geometry(self, tolerance: Mapping[str, float] = MappingProxyType({})) -> UruGeometry:
+        if tolerance:
+            raise NotImplementedError
+
+        def exact(values: Sequence[float]) -> Any:
+            return tuple(Interval(value, value) for value in values)
+
+        g = self.geometry
+        return g._replace(
+            base=exact(g.base),
+            platform=exact(g.platform),
+            proximal=exact(g.proximal),
+            distal=exact(g.distal),
+            gear=exact(g.gear),
+            limit_cosine=exact(g.limit_cosine),
+            limit_sine=exact(g.limit_sine),
+            limit_bound=exact(g.limit_bound),
+        )
+
+    def single_octants(self, mode: Mode) -> tuple[Mode, ...]:
+        """det H = 0 (17) on the coordinate planes."""
+        sides = [(side,) if side else (1.0, -1.0) for side in mode.signs.octant]
+        return tuple(
+            Mode(mode.label, mode.signs._replace(octant=octant)) for octant in itertools.product(*sides)
+        )
 
     def reach_radius(self) -> float:
         g = self.geometry
