@@ -30,6 +30,7 @@ ROOMS = (
     "metrics",
     "problem",
     "design_space",
+    "certificates",
     "optimizers",
     "runs",
     "study",

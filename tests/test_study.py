@@ -87,7 +87,7 @@ def test_everything_inside_is_si(tmp_path: Path) -> None:
     assert [goal.minimum for goal in problem.constraints] == [1.0, 0.3, 0.02, 0.02]
     assert [(goal.label, goal.sense) for goal in problem.objectives] == [("total_link_length", "minimize")]
     assert [goal.label for goal in problem.record] == ["gci"]
-    assert study.tolerance == {"db": 1e-4, "f": 1e-4, "r": 1e-4}
+    assert study.certification.tolerance == {"db": 1e-4, "f": 1e-4, "r": 1e-4}
     assert (study.optimizer.method, study.optimizer.budget) == ("scipy.differential_evolution", 4000)
     assert (study.optimizer.seed, study.optimizer.polish) == (1, "nlopt.cobyla")
 
@@ -107,7 +107,7 @@ def test_the_same_question_in_other_units_is_the_same_problem(tmp_path: Path) ->
     millimetres = load_study(written(tmp_path, GOOD))
     study = load_study(written(tmp_path, metres))
     assert study.problem == millimetres.problem
-    assert study.tolerance == millimetres.tolerance
+    assert study.certification == millimetres.certification
     assert study.study_hash != millimetres.study_hash
 
 

@@ -8,6 +8,7 @@ from tpm_design.arithmetic import (
     Interval,
     arctangent2,
     cosine,
+    direction,
     direction_cosine,
     greater,
     lesser,
@@ -21,8 +22,30 @@ from tpm_design.arithmetic import (
 # isort: split
 from numba import njit
 
-BINARY = ("add", "sub", "mul", "div", "lesser", "greater", "direction_cosine", "arctangent2")
-UNARY = ("neg", "sqr", "root", "pos", "magnitude", "sine", "cosine", "affine")
+BINARY = (
+    "add",
+    "sub",
+    "mul",
+    "div",
+    "lesser",
+    "greater",
+    "direction_cosine",
+    "arctangent2",
+    "direction_c",
+    "direction_s",
+)
+UNARY = (
+    "neg",
+    "sqr",
+    "root",
+    "pos",
+    "magnitude",
+    "sine",
+    "cosine",
+    "affine",
+    "times_positive",
+    "times_negative",
+)
 
 
 @njit
@@ -31,6 +54,7 @@ def enclose(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
     for i in range(len(a)):
         x = Interval(a[i, 0], a[i, 1])
         y = Interval(b[i, 0], b[i, 1])
+        along, across = direction(x, y)
         results = (
             x + y,
             x - y,
@@ -40,6 +64,8 @@ def enclose(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
             greater(x, y),
             direction_cosine(x, y),
             arctangent2(x, y),
+            along,
+            across,
             -x,
             sqr(x),
             root(x),
@@ -48,6 +74,8 @@ def enclose(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
             sine(x),
             cosine(x),
             3 - x * 0.1 + 2.0,
+            x * 7.3e4,
+            -1e-300 * x,
         )
         for k in range(len(results)):
             out[k, i, 0] = results[k].lo

@@ -28,6 +28,7 @@ LARGEST = sys.float_info.max
 LEAST = 5e-324
 INFINITY = math.inf
 EVERY = BINARY + UNARY
+NOT_MONOTONE = ("sine", "cosine", "arctangent2", "direction_cosine", "direction_c", "direction_s")
 
 PRECISION = 1200  # bits
 
@@ -51,14 +52,18 @@ def exact(name: str, x: float, y: float) -> Fraction | mpmath.mpf | None:
         "pos": lambda: max(u, Fraction(0)),
         "magnitude": lambda: abs(u),
         "affine": lambda: 3 - u * Fraction(0.1) + 2,
+        "times_positive": lambda: u * Fraction(7.3e4),
+        "times_negative": lambda: u * Fraction(-1e-300),
     }
     if name in rational:
         return rational[name]()
     p, q = mpmath.mpf(x), mpmath.mpf(y)
     with mpmath.workprec(PRECISION):
-        if name in ("direction_cosine", "arctangent2") and x == y == 0:
+        if name in ("direction_cosine", "arctangent2", "direction_c", "direction_s") and x == y == 0:
             return mpmath.mpf(0)
         return {
+            "direction_c": lambda: p / mpmath.sqrt(p * p + q * q),
+            "direction_s": lambda: q / mpmath.sqrt(p * p + q * q),
             "direction_cosine": lambda: p / mpmath.sqrt(p * p + q * q),
             "arctangent2": lambda: mpmath.atan2(p, q),
             "root": lambda: mpmath.sqrt(max(p, mpmath.mpf(0))),
@@ -154,7 +159,7 @@ def test_a_part_gives_a_part(batch: list, first: float, second: float) -> None:
     inner = run(part(pairs[:, 0]), part(pairs[:, 1]))
     for name in EVERY:
         # the C library's functions are not monotone to the last bit
-        slack = 8 * 2.0**-52 if name in ("sine", "cosine", "arctangent2", "direction_cosine") else 0.0
+        slack = 8 * 2.0**-52 if name in NOT_MONOTONE else 0.0
         assert (inner[name][:, 0] >= whole[name][:, 0] - slack).all(), name
         assert (inner[name][:, 1] <= whole[name][:, 1] + slack).all(), name
 
@@ -168,7 +173,7 @@ def test_points_give_bounds_a_few_ulps_apart() -> None:
         scale = 10 + np.abs(x) if name == "affine" else np.abs(result).max(axis=1)
         width = result[:, 1] - result[:, 0]
         assert (width <= 20 * 2.0**-52 * scale + 50 * LEAST).all(), name
-        if name in ("add", "sub", "mul", "div", "sqr", "root"):
+        if name in ("add", "sub", "mul", "div", "sqr", "root", "times_positive", "times_negative"):
             assert (width <= 4 * np.spacing(scale) + 2 * LEAST).all(), name
         if name in ("neg", "pos", "magnitude", "lesser", "greater"):
             assert (width == 0).all(), name
@@ -186,6 +191,34 @@ def test_an_unknown_operand_gives_no_bound() -> None:
     assert results["sine"].tolist() == results["direction_cosine"].tolist() == [[-1.0, 1.0]]
     assert holds(results["arctangent2"][0], mpmath.pi)
     assert holds(results["arctangent2"][0], -mpmath.pi)
+
+
+def test_infinite_numbers_lie_beyond_all_floats() -> None:
+    """Compiled code may meet them: they never turn into NaN or into a bound that excludes everything."""
+    ends = np.array([[INFINITY, INFINITY], [-INFINITY, -INFINITY], [1.0, 2.0], [0.0, 0.0], [-1.0, INFINITY]])
+    pairs = np.array(list(itertools.product(ends, ends)))
+    for name, found in run(pairs[:, 0].copy(), pairs[:, 1].copy()).items():
+        assert (found[:, 0] <= found[:, 1]).all(), name
+        assert (found[:, 0] < INFINITY).all(), name
+        assert (found[:, 1] > -INFINITY).all(), name
+    total = run(ends[:1].copy(), ends[1:2].copy())["add"]
+    assert total[0, 0] <= 0 <= total[0, 1]
+
+
+def test_zero_times_a_missing_bound_in_every_place() -> None:
+    """0·∞ may be any of the four products: the bounds are those of the finite numbers, however large."""
+    ends = [-INFINITY, -2.0, -0.0, 0.0, 3.0, INFINITY]
+    every = [
+        (lo, hi) for lo, hi in itertools.product(ends, ends) if lo <= hi and lo < INFINITY and hi > -INFINITY
+    ]
+    pairs = np.array(list(itertools.product(every, every)))
+    found = run(pairs[:, 0].copy(), pairs[:, 1].copy())["mul"]
+    large = 1e30
+    for (a, b), (lo, hi) in zip(np.clip(pairs, -large, large).tolist(), found.tolist(), strict=True):
+        products = [x * y for x, y in itertools.product(a, b)]
+        least, most = min(products), max(products)
+        assert lo == -INFINITY if least <= -large else least - 1e-14 <= lo <= least
+        assert hi == INFINITY if most >= large else most <= hi <= most + 1e-14
 
 
 def test_division_by_an_interval_with_zero() -> None:
@@ -267,7 +300,10 @@ def test_numbers_are_taken_exactly() -> None:
     assert +x == x
 
 
-@pytest.mark.parametrize(("lo", "hi"), [(2.0, 1.0), (math.nan, 1.0), (0.0, math.nan)])
+@pytest.mark.parametrize(
+    ("lo", "hi"),
+    [(2.0, 1.0), (math.nan, 1.0), (0.0, math.nan), (INFINITY, INFINITY), (-INFINITY, -INFINITY)],
+)
 def test_an_interval_that_holds_nothing_is_refused(lo: float, hi: float) -> None:
     with pytest.raises(ParameterError, match="holds nothing"):
         Interval(lo, hi)

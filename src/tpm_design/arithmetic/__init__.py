@@ -9,6 +9,7 @@ from tpm_design.arithmetic.formula import formula
 from tpm_design.arithmetic.functions import (
     arctangent2,
     cosine,
+    direction,
     direction_cosine,
     greater,
     lesser,
@@ -26,6 +27,7 @@ __all__ = [
     "Interval",
     "arctangent2",
     "cosine",
+    "direction",
     "direction_cosine",
     "formula",
     "greater",

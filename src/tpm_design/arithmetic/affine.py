@@ -24,12 +24,10 @@ from tpm_design.arithmetic.interval import (
     INFINITY,
     Interval,
     down_sum,
-    interval_type,
     is_interval,
-    known_hi,
-    known_lo,
     up_sum,
 )
+from tpm_design.arithmetic.interval_functions import as_interval
 
 # isort: split
 from numba import types
@@ -48,8 +46,6 @@ from numba.extending import (
 GROWTH = 1.0 + 16.0 * EPSILON
 # more than what underflow takes from the products of one operation
 UNDERFLOW = 1e-300
-# half of 2/√3, the greatest curvature of the direction cosine at distance 1
-CURVATURE = 0.57736
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,10 +116,8 @@ def bounds(a: Affine) -> Interval:
 @register_jitable(**STRICT)
 def constant_form(value: Any) -> Any:
     """What is known to be in an Interval, and no more."""
-    lo, hi = known_lo(value), known_hi(value)
-    centre = 0.5 * lo + 0.5 * hi
-    error = max(hi - centre, centre - lo) * GROWTH
-    return Affine(centre, 0.0, 0.0, 0.0, error)
+    centre = 0.5 * value.lo + 0.5 * value.hi
+    return Affine(centre, 0.0, 0.0, 0.0, max(value.hi - centre, centre - value.lo) * GROWTH)
 
 
 @register_jitable(**STRICT)
@@ -258,27 +252,11 @@ def _constant_multiply(a: Any, b: Any) -> Any:
 
 
 def _divide_constant(a: Any, b: Any) -> Any:
-    return multiply(a, as_affine(1.0 / functions_interval(b)))
+    return multiply(a, constant_form(1.0 / as_interval(b)))
 
 
 def _constant_divide(a: Any, b: Any) -> Any:
     return multiply(as_affine(a), inverse(b))
-
-
-def functions_interval(x: Any) -> Any:
-    """A constant as an Interval."""
-    raise NotImplementedError
-
-
-@overload(functions_interval, jit_options=STRICT, strict=False)
-def _overload_functions_interval(x: Any) -> Function | None:
-    if is_interval(x):
-        return _form_itself
-    return _number_interval if is_number(x) else None
-
-
-def _number_interval(x: Any) -> Any:
-    return Interval(x, x)
 
 
 for _function in (add, subtract, multiply):
@@ -361,41 +339,45 @@ def greater(a: Any, b: Any) -> Any:
 
 
 @register_jitable(**STRICT)
-def cosine_of_forms(a: Any, b: Any) -> Any:
-    """p/√(p² + q²) = c cos φ − s sin φ, where c, s are the cosine and sine at the centre, at distance ρ from
-    the origin, and tan φ = τ = t/(ρ + r) for a displacement t across and r along the ray from the origin:
-    c − s t/ρ within c τ²/2 + s (τ³/2 + τ r/ρ). What changes r alone, a scale of both, changes nothing."""
-    p, q = a.centre, b.centre
-    distance = math.sqrt(p * p + q * q)
-    if not distance > UNDERFLOW:
-        return constant_form(functions.direction_cosine(bounds(a), bounds(b)))
-    c, s = p / distance, q / distance
+def direction_of_forms(a: Any, b: Any) -> Any:
+    """Cosine and sine of φ₀ + φ, φ₀ at the centre, at distance ρ from the origin, and tan φ = t/(ρ + r) for a
+    displacement r along the ray from the origin and t across it. With τ = |tan φ| at most,
+    cos φ = 1 − τ²/4 ± τ²/4 and sin φ = t/ρ ± (τ³/2 + τ r/ρ). A scale of both a and b changes r alone."""
+    distance = math.sqrt(a.centre * a.centre + b.centre * b.centre)
+    c, s = a.centre / distance, b.centre / distance
     first = (c * b.by_first - s * a.by_first) / distance
     second = (c * b.by_second - s * a.by_second) / distance
     third = (c * b.by_third - s * a.by_third) / distance
-    errors = (a.error + b.error) / distance
-    sizes = (slopes_size(a) + slopes_size(b)) / distance
-    rounding = 8.0 * EPSILON * (1.0 + sizes)
-    # in units of ρ
     along = (
         abs(c * a.by_first + s * b.by_first)
         + abs(c * a.by_second + s * b.by_second)
         + abs(c * a.by_third + s * b.by_third)
-    ) / distance + (errors + rounding)
+    ) / distance
+    rounding = 16.0 * EPSILON * (1.0 + (slopes_size(a) + slopes_size(b)) / distance)
     off = (abs(s) * a.error + abs(c) * b.error) / distance + rounding
-    across = abs(first) + abs(second) + abs(third) + off
-    if not along < 0.5:
-        return constant_form(functions.direction_cosine(bounds(a), bounds(b)))
-    tangent = across / (1.0 - along)
-    half = 0.25 * abs(c) * tangent * tangent
-    error = (
-        abs(s) * (off + tangent * (0.5 * tangent * tangent + along)) + half + rounding
-    ) * GROWTH
-    return Affine(c - math.copysign(half, c), -s * first, -s * second, -s * third, error)
+    along += (abs(c) * a.error + abs(s) * b.error) / distance + rounding
+    if not (along < 0.5 and distance > UNDERFLOW):
+        cosine, sine = functions.direction(bounds(a), bounds(b))
+        return constant_form(cosine), constant_form(sine)
+    tangent = (abs(first) + abs(second) + abs(third) + off) * GROWTH / (1.0 - along * GROWTH)
+    squared = tangent * tangent
+    turned = off + tangent * (0.5 * squared + along)
+    quarter = 0.25 * squared
+    across = (abs(s) * turned + abs(c) * quarter + rounding) * GROWTH
+    beyond = (abs(c) * turned + abs(s) * quarter + rounding) * GROWTH
+    short = 1.0 - quarter
+    return (
+        Affine(c * short, -s * first, -s * second, -s * third, across),
+        Affine(s * short, c * first, c * second, c * third, beyond),
+    )
+
+
+def direction(p: Any, q: Any) -> Any:
+    return direction_of_forms(as_affine(p), as_affine(q))
 
 
 def direction_cosine(p: Any, q: Any) -> Any:
-    return cosine_of_forms(as_affine(p), as_affine(q))
+    return direction_of_forms(as_affine(p), as_affine(q))[0]
 
 
 @register_jitable(**STRICT)
@@ -413,7 +395,9 @@ def spread(a: Any) -> float:
     return slopes_size(a) + a.error
 
 
-def determinant(a11: Any, a12: Any, a13: Any, a21: Any, a22: Any, a23: Any, a31: Any, a32: Any, a33: Any) -> Any:
+def determinant(
+    a11: Any, a12: Any, a13: Any, a21: Any, a22: Any, a23: Any, a31: Any, a32: Any, a33: Any
+) -> Any:
     """Linear in each entry: the cofactors at the centre carry slopes and errors, so that nearly parallel rows
     damp the errors of all rows; products of two and three deviations are remainder."""
     a, b, c, d, e, f, g, h, i = a11, a12, a13, a21, a22, a23, a31, a32, a33
@@ -492,6 +476,7 @@ for _function, _implementation, _count in (
     (functions.magnitude, magnitude, 1),
     (functions.lesser, lesser, 2),
     (functions.greater, greater, 2),
+    (functions.direction, direction, 2),
     (functions.direction_cosine, direction_cosine, 2),
 ):
     _serve(_function, _implementation, _count)

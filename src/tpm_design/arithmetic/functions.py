@@ -173,6 +173,22 @@ def direction_cosine(p: Any, q: Any) -> Any:
     return p / math.sqrt(max(p * p + q * q, LEAST_SQUARE))
 
 
+def _dual_direction(p: Any, q: Any) -> Any:
+    u, v = as_dual(p, q), as_dual(q, p)
+    along, across = direction(u.value, v.value)
+    scale = inverse_length(u.value, v.value)
+    turn = combinations(-across * scale, u.derivatives, along * scale, v.derivatives)
+    return Dual(along, multiples(-across, turn)), Dual(across, multiples(along, turn))
+
+
+@scalar_function(intervals=enclosure.direction, duals=_dual_direction)
+def direction(p: Any, q: Any) -> Any:
+    """Cosine and sine of the angle between (p, q) and the first axis, (0, 0) at the origin; each as
+    ``direction_cosine`` has it, in one go."""
+    inverse = 1 / math.sqrt(max(p * p + q * q, LEAST_SQUARE))
+    return p * inverse, q * inverse
+
+
 def _dual_sine(x: Any) -> Any:
     return Dual(sine(x.value), multiples(cosine(x.value), x.derivatives))
 

@@ -1,9 +1,10 @@
 """Intervals with outward rounding, in Python and in compiled code.
 
-``Interval(lo, hi)`` stands for the real numbers between its bounds; −∞ and +∞ stand for a missing bound, and
-so does a NaN that enters compiled code. Every operation encloses the exact result for all members of its
-operands. Processors round to nearest, half an ulp off at most; each bound is therefore moved outward by one
-to two ulps, x ∓ (|x|·2⁻⁵² + 2⁻¹⁰⁷⁴), which needs no change of rounding mode. Numbers mixed in are exact.
+``Interval(lo, hi)`` stands for the real numbers between its bounds; −∞ below and +∞ above stand for a missing
+bound, and so does a NaN that enters compiled code; an infinite number there lies beyond all floats. Every
+operation encloses the exact result for all members of its operands. Processors round to nearest, half an ulp
+off at most; each bound is therefore moved outward by one to two ulps, x ∓ (|x|·2⁻⁵² + 2⁻¹⁰⁷⁴), which needs no
+change of rounding mode. Numbers mixed in are exact.
 
 The functions below are the only implementation: Python calls them as they are, Numba compiles them.
 """
@@ -14,7 +15,13 @@ import operator
 from dataclasses import dataclass
 from typing import Any
 
-from tpm_design.arithmetic.compilation import STRICT, is_number, register_operator, register_unary
+from tpm_design.arithmetic.compilation import (
+    PRIMITIVE,
+    STRICT,
+    is_number,
+    register_operator,
+    register_unary,
+)
 from tpm_design.errors import ParameterError
 
 # isort: split
@@ -26,6 +33,7 @@ from numba.extending import (
     lower_builtin,
     make_attribute_wrapper,
     models,
+    overload,
     register_jitable,
     register_model,
     type_callable,
@@ -41,7 +49,7 @@ EPSILON = 2.0**-52
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """The real numbers from ``lo`` to ``hi``. Raises ParameterError unless lo ≤ hi.
+    """The real numbers from ``lo`` to ``hi``. Raises ParameterError where there are none.
 
     ``+ − * /`` with intervals and numbers; numbers (integers up to 2⁵³) are exact.
     """
@@ -53,7 +61,7 @@ class Interval:
     hi: float
 
     def __post_init__(self) -> None:
-        if not self.lo <= self.hi:
+        if not self.lo <= self.hi or self.lo == INFINITY or self.hi == -INFINITY:
             raise ParameterError(
                 f"An interval from {self.lo!r} to {self.hi!r} holds nothing.",
                 remedy="Give two numbers, the lower bound first.",
@@ -123,20 +131,35 @@ make_attribute_wrapper(IntervalType, "lo", "lo")
 make_attribute_wrapper(IntervalType, "hi", "hi")
 
 
-@type_callable(Interval)
-def _type_constructor(context: Any) -> Any:
+def bounded(lo: float, hi: float) -> Interval:
+    """``Interval(lo, hi)``, in compiled code without a look at the bounds."""
+    return Interval(lo, hi)
+
+
+@type_callable(bounded)
+def _type_bounded(context: Any) -> Any:
     def typer(lo: Any, hi: Any) -> Any:
         return interval_type if is_number(lo) and is_number(hi) else None
 
     return typer
 
 
-@lower_builtin(Interval, types.Number, types.Number)
-def _lower_constructor(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+@lower_builtin(bounded, types.Number, types.Number)
+def _lower_bounded(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     interval = cgutils.create_struct_proxy(interval_type)(context, builder)
     interval.lo = context.cast(builder, arguments[0], signature.args[0], types.float64)
     interval.hi = context.cast(builder, arguments[1], signature.args[1], types.float64)
     return interval._getvalue()
+
+
+# a function with options of its own, so that fast-math licences of the caller do not void the look for NaN
+@overload(Interval, jit_options=PRIMITIVE, strict=False)
+def _overload_constructor(lo: Any, hi: Any) -> Any:
+    def constructor(lo: Any, hi: Any) -> Any:
+        x, y = float(lo), float(hi)
+        return bounded(least(LARGEST, most(-INFINITY, x)), most(-LARGEST, least(INFINITY, y)))
+
+    return constructor if is_number(lo) and is_number(hi) else None
 
 
 @unbox(IntervalType)
@@ -163,59 +186,50 @@ def _box_interval(kind: Any, value: Any, c: Any) -> Any:
     return result
 
 
-# The order of operands of min and max below decides what becomes of a NaN: both keep their first operand
-# unless the second compares smaller (larger).
+# In compiled code no bound is NaN, no lower bound +∞ and no upper bound −∞: the constructor sees to that, and
+# every operation keeps it. ``least`` and ``most`` pass over a NaN in second place.
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
+def least(a: float, b: float) -> float:
+    return b if b < a else a
+
+
+@register_jitable(**PRIMITIVE)
+def most(a: float, b: float) -> float:
+    return b if b > a else a
+
+
+@register_jitable(**PRIMITIVE)
 def down(x: float) -> float:
-    """A float below every real number that rounds to ``x``; NaN, an unknown bound, gives −∞."""
-    finite = min(x, LARGEST)
-    return max(-INFINITY, finite - abs(finite) * EPSILON - SMALLEST)
+    """A float below every real number that rounds to ``x``."""
+    finite = least(x, LARGEST)
+    return finite - abs(finite) * EPSILON - SMALLEST
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
 def up(x: float) -> float:
-    """A float above every real number that rounds to ``x``; NaN, an unknown bound, gives +∞."""
-    finite = max(x, -LARGEST)
-    return min(INFINITY, finite + abs(finite) * EPSILON + SMALLEST)
+    """A float above every real number that rounds to ``x``."""
+    finite = most(x, -LARGEST)
+    return finite + abs(finite) * EPSILON + SMALLEST
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
 def down_sum(x: float) -> float:
     """``down`` for sums and square roots: they never underflow, so that a zero is exact and stays."""
-    finite = min(x, LARGEST)
-    return max(-INFINITY, finite - abs(finite) * EPSILON)
+    finite = least(x, LARGEST)
+    return finite - abs(finite) * EPSILON
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
 def up_sum(x: float) -> float:
     """``up`` for sums and square roots."""
-    finite = max(x, -LARGEST)
-    return min(INFINITY, finite + abs(finite) * EPSILON)
-
-
-@register_jitable(**STRICT)
-def product(a: float, b: float) -> float:
-    """a·b with 0·∞ = 0: an infinite bound stands for arbitrarily large real numbers."""
-    p = a * b
-    return p if p == p else 0.0  # noqa: PLR0124  (NaN)
-
-
-@register_jitable(**STRICT)
-def known_lo(x: Interval) -> float:
-    """The lower bound, −∞ in place of NaN."""
-    return max(-INFINITY, x.lo)
-
-
-@register_jitable(**STRICT)
-def known_hi(x: Interval) -> float:
-    """The upper bound, +∞ in place of NaN."""
-    return min(INFINITY, x.hi)
+    finite = most(x, -LARGEST)
+    return finite + abs(finite) * EPSILON
 
 
 def negate(a: Interval) -> Interval:
-    return Interval(-a.hi, -a.lo)
+    return bounded(-a.hi, -a.lo)
 
 
 def identity(a: Any) -> Any:
@@ -223,63 +237,75 @@ def identity(a: Any) -> Any:
 
 
 def add(a: Interval, b: Interval) -> Interval:
-    return Interval(down_sum(a.lo + b.lo), up_sum(a.hi + b.hi))
+    return bounded(down_sum(a.lo + b.lo), up_sum(a.hi + b.hi))
 
 
 def add_number(a: Interval, b: float) -> Interval:
-    return Interval(down_sum(a.lo + b), up_sum(a.hi + b))
+    return a + Interval(b, b)
 
 
 def add_to_number(a: float, b: Interval) -> Interval:
-    return Interval(down_sum(a + b.lo), up_sum(a + b.hi))
+    return Interval(a, a) + b
 
 
 def subtract(a: Interval, b: Interval) -> Interval:
-    return Interval(down_sum(a.lo - b.hi), up_sum(a.hi - b.lo))
+    return bounded(down_sum(a.lo - b.hi), up_sum(a.hi - b.lo))
 
 
 def subtract_number(a: Interval, b: float) -> Interval:
-    return Interval(down_sum(a.lo - b), up_sum(a.hi - b))
+    return a - Interval(b, b)
 
 
 def subtract_from_number(a: float, b: Interval) -> Interval:
-    return Interval(down_sum(a - b.hi), up_sum(a - b.lo))
+    return Interval(a, a) - b
 
 
 def multiply(a: Interval, b: Interval) -> Interval:
-    a_lo, a_hi, b_lo, b_hi = known_lo(a), known_hi(a), known_lo(b), known_hi(b)
-    p, q = product(a_lo, b_lo), product(a_lo, b_hi)
-    r, s = product(a_hi, b_lo), product(a_hi, b_hi)
-    return Interval(down(min(p, q, r, s)), up(max(p, q, r, s)))
+    """0·∞ is NaN and stands for 0, as an infinite bound stands for arbitrarily large real numbers. Passing
+    over it is enough: where it is not the first product, 0 lies between the others."""
+    p, q, r, s = a.lo * b.lo, a.lo * b.hi, a.hi * b.lo, a.hi * b.hi
+    p = p if p == p else 0.0  # noqa: PLR0124  (NaN)
+    return bounded(down(least(least(least(p, q), r), s)), up(most(most(most(p, q), r), s)))
 
 
 def multiply_number(a: Interval, b: float) -> Interval:
+    if 0.0 < b <= LARGEST:
+        return bounded(down(a.lo * b), up(a.hi * b))
     return a * Interval(b, b)
 
 
 def multiply_by_number(a: float, b: Interval) -> Interval:
-    return Interval(a, a) * b
+    return b * a
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
 def quotient(a_lo: float, a_hi: float, b_lo: float, b_hi: float) -> Interval:
     """Bounds of a/b for b > 0, or b ≥ 0 where a keeps away from 0 (b = 0 is then a missing bound)."""
     below = b_hi if a_lo >= 0 else b_lo
     above = b_lo if a_hi >= 0 else b_hi
     lo = down(a_lo / below) if below > 0 else -INFINITY
     hi = up(a_hi / above) if above > 0 else INFINITY
-    return Interval(lo, hi)
+    return bounded(lo, hi)
+
+
+@register_jitable(**STRICT)
+def general_quotient(a: Interval, b: Interval) -> Interval:
+    """a/b; half a line where b has 0 at one end and a keeps away from 0, else the whole line if 0 is in b."""
+    away = (a.lo > 0) | (a.hi < 0)
+    if (b.lo > 0) | ((b.lo == 0) & (b.hi > 0) & away):
+        return quotient(a.lo, a.hi, b.lo, b.hi)
+    if (b.hi < 0) | ((b.hi == 0) & (b.lo < 0) & away):
+        return quotient(-a.hi, -a.lo, -b.hi, -b.lo)
+    return bounded(-INFINITY, INFINITY)
 
 
 def divide(a: Interval, b: Interval) -> Interval:
-    """a/b; half a line where b has 0 at one end and a keeps away from 0, else the whole line if 0 is in b."""
-    a_lo, a_hi, b_lo, b_hi = known_lo(a), known_hi(a), known_lo(b), known_hi(b)
-    away = (a_lo > 0) | (a_hi < 0)
-    if (b_lo > 0) | ((b_lo == 0) & (b_hi > 0) & away):
-        return quotient(a_lo, a_hi, b_lo, b_hi)
-    if (b_hi < 0) | ((b_hi == 0) & (b_lo < 0) & away):
-        return quotient(-a_hi, -a_lo, -b_hi, -b_lo)
-    return Interval(-INFINITY, INFINITY)
+    """As ``general_quotient``, in line where b > 0."""
+    if b.lo > 0:
+        below = b.hi if a.lo >= 0 else b.lo
+        above = b.lo if a.hi >= 0 else b.hi
+        return bounded(down(a.lo / below), up(a.hi / above))
+    return general_quotient(a, b)
 
 
 def divide_by_number(a: Interval, b: float) -> Interval:
@@ -290,10 +316,10 @@ def divide_number(a: float, b: Interval) -> Interval:
     return Interval(a, a) / b
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
 def hull(a: Interval, b: Interval) -> Interval:
     """The smallest interval that holds both."""
-    return Interval(min(known_lo(a), known_lo(b)), max(known_hi(a), known_hi(b)))
+    return bounded(least(a.lo, b.lo), most(a.hi, b.hi))
 
 
 register_operator(operator.add, is_interval, is_number, add, add_number, add_to_number)

@@ -9,18 +9,19 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from tpm_design.arithmetic.compilation import STRICT, is_number
+from tpm_design.arithmetic.compilation import PRIMITIVE, STRICT, is_number
 from tpm_design.arithmetic.interval import (
     EPSILON,
     INFINITY,
     SMALLEST,
     Interval,
+    bounded,
     down,
     down_sum,
     hull,
     is_interval,
-    known_hi,
-    known_lo,
+    least,
+    most,
     up,
     up_sum,
 )
@@ -32,6 +33,8 @@ PI_BELOW, PI_ABOVE = 3.141592653589793, 3.1415926535897936  # π = 3.14159265358
 TURN = 2 * math.pi
 # beyond it, counting turns in floats is no longer worth trusting
 LARGEST_ANGLE = 1e5
+# below it, a sum of squares may have lost digits to underflow
+LEAST_SQUARE = 1e-280
 
 
 def as_interval(x: Any) -> Interval:
@@ -54,76 +57,76 @@ def _overload_as_interval(x: Any) -> Any:
     return _number_as_interval if is_number(x) else None
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
 def largest_magnitude(x: Interval) -> float:
-    return max(-known_lo(x), known_hi(x))
+    return most(-x.lo, x.hi)
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
 def least_magnitude(x: Interval) -> float:
-    return max(0.0, known_lo(x), -known_hi(x))
+    return most(most(0.0, x.lo), -x.hi)
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
 def four_down(x: float) -> float:
-    return x - (abs(x) * (4 * EPSILON) + 4 * SMALLEST)
+    return x - abs(x) * (4 * EPSILON) - 4 * SMALLEST
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
 def four_up(x: float) -> float:
-    return x + (abs(x) * (4 * EPSILON) + 4 * SMALLEST)
+    return x + abs(x) * (4 * EPSILON) + 4 * SMALLEST
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
 def sqr(x: Interval) -> Interval:
-    least, most = least_magnitude(x), largest_magnitude(x)
-    return Interval(max(0.0, down(least * least)), up(most * most))
+    near, far = least_magnitude(x), largest_magnitude(x)
+    return bounded(most(0.0, down(near * near)), up(far * far))
 
 
-@register_jitable(**STRICT)
+@register_jitable(**PRIMITIVE)
 def root(x: Interval) -> Interval:
-    return Interval(down_sum(math.sqrt(max(0.0, known_lo(x)))), up_sum(math.sqrt(max(0.0, known_hi(x)))))
+    return bounded(down_sum(math.sqrt(most(0.0, x.lo))), up_sum(math.sqrt(most(0.0, x.hi))))
 
 
 def root_slope(x: Interval) -> Interval:
     """Derivatives of √max(x, 0): half a line where the argument reaches 0."""
-    if known_hi(x) <= 0:
-        return Interval(0.0, 0.0)
+    if x.hi <= 0:
+        return bounded(0.0, 0.0)
     slope = 1 / (2 * root(x))
-    return slope if known_lo(x) > 0 else Interval(0.0, INFINITY)
+    return slope if x.lo > 0 else bounded(0.0, INFINITY)
 
 
 def pos(x: Interval) -> Interval:
-    return Interval(max(0.0, known_lo(x)), max(0.0, known_hi(x)))
+    return bounded(most(0.0, x.lo), most(0.0, x.hi))
 
 
 def pos_slope(x: Interval) -> Interval:
-    return Interval(1.0 if known_lo(x) > 0 else 0.0, 1.0 if known_hi(x) > 0 else 0.0)
+    return bounded(1.0 if x.lo > 0 else 0.0, 1.0 if x.hi > 0 else 0.0)
 
 
 def magnitude(x: Interval) -> Interval:
-    return Interval(least_magnitude(x), largest_magnitude(x))
+    return bounded(least_magnitude(x), largest_magnitude(x))
 
 
 def magnitude_slope(x: Interval) -> Interval:
-    return Interval(1.0 if known_lo(x) >= 0 else -1.0, 1.0 if known_hi(x) >= 0 else -1.0)
+    return bounded(1.0 if x.lo >= 0 else -1.0, 1.0 if x.hi >= 0 else -1.0)
 
 
 def lesser(a: Any, b: Any) -> Interval:
     u, v = as_interval(a), as_interval(b)
-    return Interval(min(known_lo(u), known_lo(v)), min(known_hi(u), known_hi(v)))
+    return bounded(least(u.lo, v.lo), least(u.hi, v.hi))
 
 
 def greater(a: Any, b: Any) -> Interval:
     u, v = as_interval(a), as_interval(b)
-    return Interval(max(known_lo(u), known_lo(v)), max(known_hi(u), known_hi(v)))
+    return bounded(most(u.lo, v.lo), most(u.hi, v.hi))
 
 
 def of_lesser(a: Interval, b: Interval, x: Interval, y: Interval) -> Interval:
     """x where a < b, y where a > b, and their hull where that is open."""
-    if known_hi(a) < known_lo(b):
+    if a.hi < b.lo:
         return x
-    return y if known_hi(b) < known_lo(a) else hull(x, y)
+    return y if b.hi < a.lo else hull(x, y)
 
 
 @register_jitable(**STRICT)
@@ -139,16 +142,58 @@ def cosine_at(p: float, q: float) -> float:
     return tangent / math.sqrt(1 + tangent * tangent)
 
 
+@register_jitable(**STRICT)
 def direction_cosine(p: Any, q: Any) -> Interval:
     """Rises with p; with |q| it falls where p > 0 and rises where p < 0."""
     u, v = as_interval(p), as_interval(q)
     near, far = least_magnitude(v), largest_magnitude(v)
-    p_lo, p_hi = known_lo(u), known_hi(u)
+    p_lo, p_hi = u.lo, u.hi
     lo = cosine_at(p_lo, far if p_lo > 0 else near)
     hi = cosine_at(p_hi, near if p_hi > 0 else far)
-    return Interval(
-        max(0.0 if p_lo >= 0 else -1.0, four_down(lo)), min(0.0 if p_hi <= 0 else 1.0, four_up(hi))
+    return bounded(
+        most(0.0 if p_lo >= 0 else -1.0, four_down(lo)), least(0.0 if p_hi <= 0 else 1.0, four_up(hi))
     )
+
+
+@register_jitable(**STRICT)
+def keeps_away(x: Interval) -> bool:
+    return (x.lo > 0) | (x.hi < 0)
+
+
+@register_jitable(**PRIMITIVE)
+def fraction_within(p: float, inverse: float, other: float, inverse_other: float) -> tuple[float, float]:
+    """Bounds from p·inverse and other·inverse_other, both in [0, 1]."""
+    return most(0.0, four_down(p * inverse)), least(1.0, four_up(other * inverse_other))
+
+
+@register_jitable(**PRIMITIVE)
+def turned(lo: float, hi: float, like: Interval) -> Interval:
+    """[lo, hi], mirrored at 0 where ``like`` is negative."""
+    return bounded(lo, hi) if like.lo > 0 else bounded(-hi, -lo)
+
+
+@register_jitable(**STRICT)
+def direction_near_axis(p: Interval, q: Interval) -> tuple[Interval, Interval]:
+    return direction_cosine(p, q), direction_cosine(q, p)
+
+
+def direction(p: Any, q: Any) -> tuple[Interval, Interval]:
+    """Two lengths serve the four bounds of a box inside one quadrant."""
+    u, v = as_interval(p), as_interval(q)
+    p_near, p_far, q_near, q_far = (
+        least_magnitude(u),
+        largest_magnitude(u),
+        least_magnitude(v),
+        largest_magnitude(v),
+    )
+    low, high = p_near * p_near + q_far * q_far, p_far * p_far + q_near * q_near
+    ordinary = (low > LEAST_SQUARE) & (low < INFINITY) & (high > LEAST_SQUARE) & (high < INFINITY)
+    if ordinary & keeps_away(u) & keeps_away(v):
+        shallow, steep = 1 / math.sqrt(high), 1 / math.sqrt(low)
+        cosine_lo, cosine_hi = fraction_within(p_near, steep, p_far, shallow)
+        sine_lo, sine_hi = fraction_within(q_near, shallow, q_far, steep)
+        return turned(cosine_lo, cosine_hi, u), turned(sine_lo, sine_hi, v)
+    return direction_near_axis(u, v)
 
 
 def inverse_length(p: Any, q: Any) -> Interval:
@@ -168,9 +213,9 @@ def reaches(lo: float, hi: float, angle: float) -> bool:
 @register_jitable(**STRICT)
 def wave(lo: float, hi: float, at_lo: float, at_hi: float, crest: float) -> Interval:
     """Range of a sine wave with crests at crest + 2πk, from its values at both ends."""
-    low = -1.0 if reaches(lo, hi, crest + math.pi) else max(-1.0, four_down(min(at_lo, at_hi)))
-    high = 1.0 if reaches(lo, hi, crest) else min(1.0, four_up(max(at_lo, at_hi)))
-    return Interval(low, high)
+    low = -1.0 if reaches(lo, hi, crest + math.pi) else most(-1.0, four_down(least(at_lo, at_hi)))
+    high = 1.0 if reaches(lo, hi, crest) else least(1.0, four_up(most(at_lo, at_hi)))
+    return bounded(low, high)
 
 
 @register_jitable(**STRICT)
@@ -181,21 +226,21 @@ def turns_countable(x: Interval) -> bool:
 def sine(x: Interval) -> Interval:
     if turns_countable(x):
         return wave(x.lo, x.hi, math.sin(x.lo), math.sin(x.hi), math.pi / 2)
-    return Interval(-1.0, 1.0)
+    return bounded(-1.0, 1.0)
 
 
 def cosine(x: Interval) -> Interval:
     if turns_countable(x):
         return wave(x.lo, x.hi, math.cos(x.lo), math.cos(x.hi), 0.0)
-    return Interval(-1.0, 1.0)
+    return bounded(-1.0, 1.0)
 
 
 def arctangent2(y: Any, x: Any) -> Interval:
     """The whole circle where the box meets the cut (y < 0 ≤ … beside x < 0); atan2(0, x < 0) = π."""
     v, u = as_interval(y), as_interval(x)
     # adding 0 turns −0 into 0, which is above the cut
-    y_lo, y_hi = known_lo(v) + 0.0, known_hi(v) + 0.0
-    x_lo, x_hi = known_lo(u) + 0.0, known_hi(u) + 0.0
+    y_lo, y_hi = v.lo + 0.0, v.hi + 0.0
+    x_lo, x_hi = u.lo + 0.0, u.hi + 0.0
     if y_lo >= 0:
         lo = math.atan2(y_lo if x_hi >= 0 else y_hi, x_hi)
         hi = math.atan2(y_hi if x_lo >= 0 else y_lo, x_lo)
@@ -206,5 +251,5 @@ def arctangent2(y: Any, x: Any) -> Interval:
         lo = math.atan2(y_lo, x_lo)
         hi = math.atan2(y_hi, x_lo)
     else:
-        return Interval(-PI_ABOVE, PI_ABOVE)
-    return Interval(max(-PI_ABOVE, four_down(lo)), min(PI_ABOVE, four_up(hi)))
+        return bounded(-PI_ABOVE, PI_ABOVE)
+    return bounded(most(-PI_ABOVE, four_down(lo)), least(PI_ABOVE, four_up(hi)))

@@ -40,8 +40,8 @@ def options(
 ) -> None:
     """Dimensions for translational parallel robots: reachable, well conditioned, far from singularities.
 
-    Exit codes: 0 done, 1 internal error, 2 wrong usage or invalid study, 3 no feasible design, 130
-    interrupted.
+    Exit codes: 0 done, 1 internal error, 2 wrong usage or invalid study, 3 no feasible design, 5 requirement
+    refuted or not proved, 130 interrupted.
     """
 
 
@@ -142,6 +142,38 @@ def optimize(
     from tpm_design.cli.commands import optimize_one
 
     return optimize_one(study, seed, budget, workers, output, as_json=as_json, quiet=quiet)
+
+
+@app.command()
+@guarded
+def certify(
+    study: Annotated[
+        Path | None, typer.Argument(metavar="[STUDY|RUN]", help="Study file or run folder.")
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Value in the study's units; may be repeated."),
+    ] = None,
+    max_tolerance: Annotated[
+        bool, typer.Option("--max-tolerance", help="Find the largest factor on the tolerances instead.")
+    ] = False,
+    check: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Prove a certificate again, by other means.")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The certificate; in the run, or certificate.json, if left out."),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Threads; one per processor if left out.")] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int | None:
+    """Prove or refute every constraint, over the whole region and for all machines within tolerance."""
+    from tpm_design.cli.certify import certify_one
+
+    return certify_one(
+        study, settings or [], max_tolerance, check, output, workers, as_json=as_json, quiet=quiet
+    )
 
 
 @app.command()

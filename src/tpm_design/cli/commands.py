@@ -78,15 +78,21 @@ def open_study(path: Path) -> tuple[Study, Design | None]:
     return study, best.evaluation.design
 
 
-def evaluate_one(
-    path: Path, settings: Sequence[str], at: str | None, *, as_json: bool, quiet: bool
-) -> int | None:
+def chosen_design(path: Path, settings: Sequence[str]) -> tuple[Study, Design, tuple[str, ...]]:
+    """A study and one design of it: the run's best where ``path`` is a run, changed by ``--set``; and a line
+    for each quantity that was assumed."""
     study, stored = open_study(path)
     given = _settings(settings)
     design, assumptions = choose_design(study, given)
-    if stored is not None:
-        design = {**stored, **{name: design[name] for name in given}}
-        assumptions = ()
+    if stored is None:
+        return study, design, assumptions
+    return study, {**stored, **{name: design[name] for name in given}}, ()
+
+
+def evaluate_one(
+    path: Path, settings: Sequence[str], at: str | None, *, as_json: bool, quiet: bool
+) -> int | None:
+    study, design, assumptions = chosen_design(path, settings)
     pose = None if at is None else _pose(study, at)
     if pose is not None:
         return _print_pose(study, design, pose, as_json=as_json)

@@ -35,6 +35,12 @@ def velocity_map(geometry: Any, mode: Any, motor: Any, x: Any, y: Any, z: Any) -
     raise NotImplementedError
 
 
+def unit_velocity_map(geometry: Any, mode: Any, motor: Any, x: Any, y: Any, z: Any) -> Any:
+    """``velocity_map`` with unit rows: the rows of A, the diagonal b, and the positive factors by which both
+    were multiplied."""
+    raise NotImplementedError
+
+
 def actuators(geometry: Any, mode: Any, motor: Any, x: Any, y: Any, z: Any) -> Any:
     """Actuator coordinates (rad or m), three of them. ``motor`` as in ``velocity_map``."""
     raise NotImplementedError
@@ -70,4 +76,16 @@ def input_transmission(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
 
 def limb_clearance(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
     """Least distance (m) between the surfaces of links of different limbs."""
+    raise NotImplementedError
+
+
+def limb_parameters(geometry: Any, limb: Any) -> Any:
+    """One limb's parameters, a tuple of one kind of number in the order of ``MechanismKind.parameters``
+    (those that every limb has)."""
+    raise NotImplementedError
+
+
+def with_limb_parameters(geometry: Any, limb: Any, values: Any) -> Any:
+    """The geometry with other parameters of one limb, in the same order. Where ``values`` are of another kind
+    of number (Duals, say), the other limbs' parameters become constants of that kind."""
     raise NotImplementedError

@@ -5,12 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tpm_design.arithmetic import Interval
 from tpm_design.errors import ParameterError, did_you_mean
 from tpm_design.mechanisms import pointwise
 from tpm_design.mechanisms.base import MechanismKind
@@ -38,11 +38,6 @@ class Mechanism(ABC):
     def mode_of(self, signs: Mapping[str, str]) -> Mode:
         """The working mode named by sign strings, e.g. ``{"octant": "+++", "elbows": "+-+"}``."""
 
-    @abstractmethod
-    def enclosed_geometry(self, tolerance: Mapping[str, float] = MappingProxyType({})) -> Any:
-        """The geometry made of Intervals that hold every machine whose parameters are within ± ``tolerance``
-        (name → SI value) of this one's."""
-
     def single_octants(self, mode: Mode) -> tuple[Mode, ...]:
         """Modes that make up ``mode`` between coordinate planes no aspect crosses; itself if there are none."""
         return (mode,)
@@ -52,8 +47,17 @@ class Mechanism(ABC):
         """Every reachable pose lies within this distance (m) of the origin."""
 
     @abstractmethod
+    def enclosed_geometry(self, tolerance: Mapping[str, float]) -> Any:
+        """The geometry as Intervals that hold every machine whose parameters differ from this one's by no
+        more than ``tolerance`` (name → ±, SI), each limb by itself; ``{}``: this machine alone."""
+
+    @abstractmethod
     def total_link_length(self) -> float:
         """Sum over the limbs of the moving links (m)."""
+
+    @abstractmethod
+    def enclosed_link_length(self, tolerance: Mapping[str, float]) -> Interval:
+        """Bounds (m) of ``total_link_length`` for every machine within ``tolerance``."""
 
     @abstractmethod
     def fk(self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor") -> FloatArray:

@@ -56,6 +56,27 @@ def _values(
     return tuple(checked_value(kind, parameter, value) for value in values)
 
 
+def limb_tolerances(kind: MechanismKind, tolerance: Mapping[str, float]) -> dict[str, tuple[float, ...]]:
+    """Tolerances (±, SI) by parameter and limb, from ``f`` for all limbs or ``f2`` for one; 0 where there is
+    none. Raises ParameterError on an unknown name or a negative tolerance."""
+    found: dict[str, tuple[float, ...]] = {}
+    for name, bound in tolerance.items():
+        parameter = kind.parameter(name)
+        if parameter is None:
+            raise ParameterError(
+                f"{kind.name} has no parameter {name!r}.", remedy=did_you_mean(name, kind.parameter_names())
+            )
+        if not 0.0 <= bound < math.inf:
+            raise ParameterError(f"The tolerance {name} = {bound!r} is not a non-negative number.")
+        count = kind.limb_count if parameter.per_limb else 1
+        values = list(found.get(parameter.name, (0.0,) * count))
+        for limb in range(count):
+            if name in (parameter.name, f"{parameter.name}{limb + 1}"):
+                values[limb] = float(bound)
+        found[parameter.name] = tuple(values)
+    return found
+
+
 def checked_value(kind: MechanismKind, parameter: Parameter, value: object) -> float:
     """``value`` as a float of the parameter's domain; raises ParameterError otherwise."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):

@@ -22,23 +22,25 @@ from tpm_design.arithmetic import (
     Interval,
     arctangent2,
     cosine,
+    direction,
     direction_cosine,
     formula,
     lesser,
     magnitude,
-    pos,
     root,
     sine,
     sqr,
 )
 from tpm_design.arithmetic.algebra import determinant
 from tpm_design.arithmetic.compilation import STRICT
+from tpm_design.arithmetic.lifting import replaced
 from tpm_design.mechanisms import equations, forward
 from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.mechanism import FloatArray, Mechanism, Mode
-from tpm_design.mechanisms.parameters import limb_values, mode_signs, three_numbers
+from tpm_design.mechanisms.parameters import limb_tolerances, limb_values, mode_signs, three_numbers
 from tpm_design.mechanisms.segments import chain_distance
 from tpm_design.mechanisms.symmetry import IDENTITY, SignedPermutation, mode_orbits, symmetries
+from tpm_design.mechanisms.two_link import distal_link
 
 Triple = tuple[float, ...]
 Quadruple = tuple[float, ...]
@@ -85,12 +87,7 @@ def _limb_chain(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-de
     beta_squared = sqr(pj) + sqr(pk)
     beta = root(beta_squared)
     rho_squared = sqr(alpha) + beta_squared
-    inverse = 1.0 / rho_squared
-    share = 0.5 + 0.5 * (sqr(r) - sqr(f)) * inverse
-    bend = (0.5 * elbow) * root(pos(sqr(f + r) * inverse - 1.0) * pos(1.0 - sqr(f - r) * inverse))
-    a = (alpha * share + beta * bend) / r
-    c = (beta * share - alpha * bend) / r
-    gamma = -(rho_squared * bend) / r
+    a, c, gamma = distal_link(alpha, beta, rho_squared, f, r, elbow)
     return a, c, gamma, beta, rho_squared, alpha
 
 
@@ -185,30 +182,26 @@ def limb_rows(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
 
 @formula(limb_rows, UruGeometry)
 def _limb_rows(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
-    """v_i and w_i/|w_i|. With w_i = v_i + (k_i γ_i/β_i) g_i and g_i ⟂ v_i the unit row is
-    cos ψ v_i + sin ψ g_i, tan ψ = k_i γ_i/β_i: no pole on the axis e_i."""
+    """v_i, w_i/|w_i| and h_i's component along e_j. With w_i = v_i + (k_i γ_i/β_i) g_i and g_i ⟂ v_i the unit
+    row is cos ψ v_i + sin ψ g_i, tan ψ = k_i γ_i/β_i: no pole on the axis e_i."""
     a, c, gamma, beta, _, _ = limb_chain(geometry, limb, elbow, p, pj, pk)
-    hj = direction_cosine(pj, pk)
-    hk = direction_cosine(pk, pj)
-    lever = geometry.gear[limb] * gamma
-    toward = direction_cosine(beta, lever)
-    across = direction_cosine(lever, beta)
+    hj, hk = direction(pj, pk)
+    toward, across = direction(beta, geometry.gear[limb] * gamma)
     v = (a, c * hj, c * hk)
-    w = (toward * a, toward * (c * hj) - across * hk, toward * (c * hk) + across * hj)
-    return v, w
+    w = (toward * v[0], toward * v[1] - across * hk, toward * v[2] + across * hj)
+    return v, w, hj
 
 
 @formula(equations.singularity_margins, UruGeometry)
 def _singularity_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """det V (20), det W/∏|w_i| (36), det H (17)."""
     k1, k2, k3 = mode.elbows
-    (v11, v12, v13), (w11, w12, w13) = limb_rows(geometry, 0, k1, x, y, z)
-    (v22, v23, v21), (w22, w23, w21) = limb_rows(geometry, 1, k2, y, z, x)
-    (v33, v31, v32), (w33, w31, w32) = limb_rows(geometry, 2, k3, z, x, y)
+    (v11, v12, v13), (w11, w12, w13), h12 = limb_rows(geometry, 0, k1, x, y, z)
+    (v22, v23, v21), (w22, w23, w21), h23 = limb_rows(geometry, 1, k2, y, z, x)
+    (v33, v31, v32), (w33, w31, w32), h31 = limb_rows(geometry, 2, k3, z, x, y)
     translation = determinant(v11, v12, v13, v21, v22, v23, v31, v32, v33)
     actuation = determinant(w11, w12, w13, w21, w22, w23, w31, w32, w33)
-    rotation = 2.0 * direction_cosine(x, y) * direction_cosine(y, z) * direction_cosine(z, x)
-    return translation, actuation, rotation
+    return translation, actuation, 2.0 * h12 * h23 * h31
 
 
 @formula(equations.serial_margins, UruGeometry)
@@ -231,8 +224,7 @@ def limb_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-u
 def _limb_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-untyped-def]
     """Joints: v_i and γ_i (18). Motors: w_i = v_i + (k_i γ_i/β_i) g_i and k_i γ_i (19)."""
     a, c, gamma, beta, _, _ = limb_chain(geometry, limb, elbow, p, pj, pk)
-    hj = direction_cosine(pj, pk)
-    hk = direction_cosine(pk, pj)
+    hj, hk = direction(pj, pk)
     gear = geometry.gear[limb]
     swing = (motor * gear) * gamma / beta
     row = (a, c * hj - swing * hk, c * hk + swing * hj)
@@ -247,6 +239,33 @@ def _velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-de
     (a22, a23, a21), b2 = limb_velocity(geometry, 1, k2, motor, y, z, x)
     (a33, a31, a32), b3 = limb_velocity(geometry, 2, k3, motor, z, x, y)
     return ((a11, a12, a13), (a21, a22, a23), (a31, a32, a33)), (b1, b2, b3)
+
+
+def limb_unit_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-untyped-def]
+    """Unit row along e_i, e_j, e_k, entry of b, and factor of one limb, see the implementation."""
+    raise NotImplementedError
+
+
+@formula(limb_unit_velocity, UruGeometry)
+def _limb_unit_velocity(geometry, limb, elbow, motor, p, pj, pk):  # type: ignore[no-untyped-def]
+    """cos ψ v_i + sin ψ g_i and k_i γ_i cos ψ, with tan ψ = k_i γ_i/β_i for motors and 0 for joints."""
+    a, c, gamma, beta, _, _ = limb_chain(geometry, limb, elbow, p, pj, pk)
+    hj, hk = direction(pj, pk)
+    toward, across = direction(beta, (motor * geometry.gear[limb]) * gamma)
+    row = (toward * a, toward * (c * hj) - across * hk, toward * (c * hk) + across * hj)
+    # lever · cos ψ = β sin ψ keeps its digits where the lever is long
+    entry = motor * (beta * across) + (1.0 - motor) * gamma
+    return row, entry, toward
+
+
+@formula(equations.unit_velocity_map, UruGeometry)
+def _unit_velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
+    """(18) as it is, (19) with each row divided by |w_i|."""
+    k1, k2, k3 = mode.elbows
+    (a11, a12, a13), b1, u1 = limb_unit_velocity(geometry, 0, k1, motor, x, y, z)
+    (a22, a23, a21), b2, u2 = limb_unit_velocity(geometry, 1, k2, motor, y, z, x)
+    (a33, a31, a32), b3, u3 = limb_unit_velocity(geometry, 2, k3, motor, z, x, y)
+    return ((a11, a12, a13), (a21, a22, a23), (a31, a32, a33)), (b1, b2, b3), (u1, u2, u3)
 
 
 def limb_angles(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-def]
@@ -346,13 +365,42 @@ def _closure(geometry, motor, q, chart, u, v, w):  # type: ignore[no-untyped-def
     return (first, second, third), (excess1, excess2, excess3)
 
 
+@formula(equations.limb_parameters, UruGeometry)
+def _limb_parameters(geometry, limb):  # type: ignore[no-untyped-def]
+    """d_b, d_p, f, r, k."""
+    return (
+        geometry.base[limb],
+        geometry.platform[limb],
+        geometry.proximal[limb],
+        geometry.distal[limb],
+        geometry.gear[limb],
+    )
+
+
+@formula(equations.with_limb_parameters, UruGeometry)
+def _with_limb_parameters(geometry, limb, values):  # type: ignore[no-untyped-def]
+    """d_b, d_p, f, r, k of one limb replaced."""
+    return UruGeometry(
+        replaced(geometry.base, limb, values[0]),
+        replaced(geometry.platform, limb, values[1]),
+        replaced(geometry.proximal, limb, values[2]),
+        replaced(geometry.distal, limb, values[3]),
+        replaced(geometry.gear, limb, values[4]),
+        geometry.limited,
+        geometry.limit_cosine,
+        geometry.limit_sine,
+        geometry.limit_bound,
+        geometry.link_radius,
+    )
+
+
 @formula(equations.joint_centres, UruGeometry)
 def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """A_i = d_b e_i, B_i = p + d_p e_i and C_i = B_i − r_i v_i of each limb."""
     k1, k2, k3 = mode.elbows
-    (v11, v12, v13), _ = limb_rows(geometry, 0, k1, x, y, z)
-    (v22, v23, v21), _ = limb_rows(geometry, 1, k2, y, z, x)
-    (v33, v31, v32), _ = limb_rows(geometry, 2, k3, z, x, y)
+    (v11, v12, v13), _, _ = limb_rows(geometry, 0, k1, x, y, z)
+    (v22, v23, v21), _, _ = limb_rows(geometry, 1, k2, y, z, x)
+    (v33, v31, v32), _, _ = limb_rows(geometry, 2, k3, z, x, y)
     b1, b2, b3 = geometry.base
     p1, p2, p3 = geometry.platform
     r1, r2, r3 = geometry.distal
@@ -435,11 +483,25 @@ def shaft_possible(angle: float, gear: float) -> bool:
     return min(ends) - math.pi <= angle <= max(ends) + math.pi
 
 
+FULL_TURN = (-math.pi, math.pi)
+# a bound on a cosine that every angle is above
+NO_LIMIT = -2.0
+
+
+def limit_enclosure(low: float, high: float) -> tuple[Interval, Interval, Interval]:
+    """Cosine and sine of the middle of a joint's range and cosine of its half width, each enclosed."""
+    middle = 0.5 * (Interval(low, low) + high)
+    half = 0.5 * (Interval(high, high) - low)
+    half = Interval(min(math.pi, half.lo), min(math.pi, half.hi))
+    return cosine(middle), sine(middle), cosine(half)
+
+
 @dataclass(frozen=True)
 class Uru(Mechanism):
     """A LaMaViP 3-URU with dimensions. Pose: (x, y, z) of the platform's point P."""
 
     geometry: UruGeometry
+    joint_ranges: tuple[tuple[float, float] | None, ...]
 
     def mode(self, *, octant: str, elbows: str) -> Mode:
         """The working mode on the given sides of the coordinate planes (``"any"``: all octants) with the
@@ -450,25 +512,6 @@ class Uru(Mechanism):
         values = mode_signs(self.kind, signs)
         label = " ".join(signs[field.name] for field in self.kind.mode_fields)
         return Mode(label, UruSigns(octant=values["octant"], elbows=values["elbows"]))
-
-    def enclosed_geometry(self, tolerance: Mapping[str, float] = MappingProxyType({})) -> UruGeometry:
-        if tolerance:
-            raise NotImplementedError
-
-        def exact(values: Sequence[float]) -> Any:
-            return tuple(Interval(value, value) for value in values)
-
-        g = self.geometry
-        return g._replace(
-            base=exact(g.base),
-            platform=exact(g.platform),
-            proximal=exact(g.proximal),
-            distal=exact(g.distal),
-            gear=exact(g.gear),
-            limit_cosine=exact(g.limit_cosine),
-            limit_sine=exact(g.limit_sine),
-            limit_bound=exact(g.limit_bound),
-        )
 
     def single_octants(self, mode: Mode) -> tuple[Mode, ...]:
         """det H = 0 (17) on the coordinate planes."""
@@ -483,8 +526,42 @@ class Uru(Mechanism):
             f + r + abs(p - b) for f, r, p, b in zip(g.proximal, g.distal, g.platform, g.base, strict=True)
         )
 
+    def enclosed_geometry(self, tolerance: Mapping[str, float]) -> Any:
+        bounds = limb_tolerances(self.kind, tolerance)
+
+        def held(name: str) -> Any:
+            around = bounds.get(name, (0.0, 0.0, 0.0))
+            return tuple(
+                Interval(value, value) if bound == 0.0 else value + Interval(-bound, bound)
+                for value, bound in zip(self.parameters[name], around, strict=True)
+            )
+
+        ranges = [limit_enclosure(*(FULL_TURN if r is None else r)) for r in self.joint_ranges]
+        limit_bounds = [
+            Interval(NO_LIMIT, NO_LIMIT) if joint is None else bound
+            for joint, (_, _, bound) in zip(self.joint_ranges, ranges, strict=True)
+        ]
+        intervals: dict[str, Any] = {
+            "base": held("db"),
+            "platform": held("dp"),
+            "proximal": held("f"),
+            "distal": held("r"),
+            "gear": held("k"),
+            "limit_cosine": tuple(middle for middle, _, _ in ranges),
+            "limit_sine": tuple(middle for _, middle, _ in ranges),
+            "limit_bound": tuple(limit_bounds),
+        }
+        return self.geometry._replace(**intervals)
+
     def total_link_length(self) -> float:
         return sum(self.geometry.proximal) + sum(self.geometry.distal)
+
+    def enclosed_link_length(self, tolerance: Mapping[str, float]) -> Interval:
+        g = self.enclosed_geometry(tolerance)
+        total = Interval(0.0, 0.0)
+        for length in (*g.proximal, *g.distal):
+            total = total + length
+        return total
 
     def fk(self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor") -> FloatArray:
         """Every real assembly (K, 3) in metres for the actuator coordinates ``q`` (3,) in rad, of all working
@@ -518,7 +595,8 @@ def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str
     """A 3-URU from SI values: db, dp, f, r (m), k, each one number or three; limits as declared."""
     values = limb_values(KIND, parameters)
     ranges = [limits.get(f"theta{joint}") for joint in (1, 2, 3, 4)]
-    spans = [(-math.pi, math.pi) if r is None else (float(r[0]), float(r[1])) for r in ranges]
+    joint_ranges = tuple(None if r is None else (float(r[0]), float(r[1])) for r in ranges)
+    spans = [FULL_TURN if r is None else r for r in joint_ranges]
     middles = [0.5 * (low + high) for low, high in spans]
     halves = [min(math.pi, 0.5 * (high - low)) for low, high in spans]
     geometry = UruGeometry(
@@ -530,10 +608,12 @@ def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str
         limited=0.0 if all(r is None for r in ranges) else 1.0,
         limit_cosine=tuple(math.cos(m) for m in middles),
         limit_sine=tuple(math.sin(m) for m in middles),
-        limit_bound=tuple(-2.0 if r is None else math.cos(h) for r, h in zip(ranges, halves, strict=True)),
+        limit_bound=tuple(
+            NO_LIMIT if r is None else math.cos(h) for r, h in zip(joint_ranges, halves, strict=True)
+        ),
         link_radius=float(limits.get("link_radius", 0.0)),
     )
-    return Uru(kind=KIND, parameters=values, geometry=geometry)
+    return Uru(kind=KIND, parameters=values, geometry=geometry, joint_ranges=joint_ranges)
 
 
 def farthest_reach(ranges: Mapping[str, tuple[float, float]]) -> float:

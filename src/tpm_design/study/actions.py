@@ -82,7 +82,7 @@ def optimize_study(
 
     began = time.perf_counter()
     result = search(study.problem, plan, workers=workers, record=record)
-    if study.tolerance:
+    if study.certification is not None:
         result = replace(result, remarks=(*result.remarks, NOT_CERTIFIED))
     if writer is not None:
         summary = {

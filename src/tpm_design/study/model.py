@@ -287,9 +287,10 @@ class AccuracyModel(Strict):
 
 
 class CertifyModel(Strict):
-    """``certify:``"""
+    """``certify:`` asks for a proof of the best design."""
 
     tolerance: dict[Text, NonNegative] = Field(default_factory=dict)
+    boxes: Annotated[Whole, Field(ge=1, le=10**8)] = 400_000
 
 
 class Steps(Strict):
@@ -366,6 +367,6 @@ class StudyModel(Strict):
     constraints: tuple[ConstraintModel, ...] = ()
     optimizer: OptimizerModel = OptimizerModel()
     accuracy: AccuracyModel = AccuracyModel()
-    certify: CertifyModel = CertifyModel()
+    certify: CertifyModel | None = None
     sweep: SweepModel | None = None
     record: tuple[RecordModel, ...] = ()

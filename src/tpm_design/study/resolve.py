@@ -28,7 +28,7 @@ from tpm_design.study.quantities import interval
 from tpm_design.study.region import read_region
 from tpm_design.study.registries import Registries, registries
 from tpm_design.study.space import free_center, read_center, read_limits, read_mode, read_parameters
-from tpm_design.study.study import OptimizerSettings, Study
+from tpm_design.study.study import Certification, OptimizerSettings, Study
 from tpm_design.study.sweep import SweepReader
 from tpm_design.units import Units, si_unit
 
@@ -54,7 +54,7 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
     center = region.center if region else None
     parameters = read_parameters(model.mechanism, kind, units, faults)
     limits = read_limits(model.mechanism.limits, kind, units, faults)
-    tolerance = _tolerance(model.certify, kind, units, faults)
+    certification = _certification(model.certify, kind, units, faults)
     optimizer = _optimizer(model.optimizer, known.optimizers, faults)
     faults.raise_if_any()  # the modes and the centre's bounds follow from the parameters
 
@@ -112,7 +112,7 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
         "constraints": [written for _, written in constraints],
         "optimizer": model.optimizer,
         "accuracy": model.accuracy,
-        "certify": {"tolerance": {name: model.certify.tolerance[name] for name in tolerance}},
+        "certify": model.certify,
         "sweep": written_sweep,
         "record": [written for _, written in record],
     }
@@ -122,7 +122,7 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
         units=units,
         problem=problem,
         optimizer=optimizer,
-        tolerance=tolerance,
+        certification=certification,
         sweep=sweep,
         resolved_json=json.dumps(plain(resolved), ensure_ascii=False, allow_nan=False),
     )
@@ -145,6 +145,15 @@ def _isotropic(model: StudyModel) -> bool:
     )
     cube = isinstance(region, BoxModel) and len(set(region.size)) == 1
     return free and (cube or isinstance(region, SphereModel))
+
+
+def _certification(
+    model: CertifyModel | None, kind: MechanismKind, units: Units, faults: Faults
+) -> Certification | None:
+    """What is to be proved of the best design, if anything."""
+    if model is None:
+        return None
+    return Certification(_tolerance(model, kind, units, faults), model.boxes)
 
 
 def _tolerance(model: CertifyModel, kind: MechanismKind, units: Units, faults: Faults) -> dict[str, float]:

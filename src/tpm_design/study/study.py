@@ -29,11 +29,20 @@ class OptimizerSettings:
 
 
 @dataclass(frozen=True)
+class Certification:
+    """What a study wants proved of its best design. ``tolerance``: manufacturing tolerances by parameter
+    name, ±, SI, of each limb by itself; ``boxes``: at most so many for each statement."""
+
+    tolerance: Mapping[str, float]
+    boxes: int
+
+
+@dataclass(frozen=True)
 class Study:
     """A validated study. ``problem`` is in SI units; ``resolved()`` in the study's own.
 
-    ``tolerance``: manufacturing tolerances by parameter name, ±, SI. Studies that ask the same are equal,
-    wherever their files lie.
+    ``certification``: None where the study asks for no proof. Studies that ask the same are equal, wherever
+    their files lie.
     """
 
     path: Path = field(compare=False)
@@ -41,7 +50,7 @@ class Study:
     units: Units
     problem: Problem
     optimizer: OptimizerSettings
-    tolerance: Mapping[str, float]
+    certification: Certification | None
     sweep: Sweep | None
     resolved_json: str = field(repr=False)
 

@@ -54,7 +54,11 @@ def _settle_forms(forms, first, signs, margin, proved, open_forms):  # type: ign
             if within.lo >= 0.0:
                 proved |= 1 << k
             else:
-                open_forms[k, 0], open_forms[k, 1], open_forms[k, 2] = form.centre, form.by_first, form.by_second
+                open_forms[k, 0], open_forms[k, 1], open_forms[k, 2] = (
+                    form.centre,
+                    form.by_first,
+                    form.by_second,
+                )
                 open_forms[k, 3], open_forms[k, 4] = form.by_third, form.error
     return proved
 

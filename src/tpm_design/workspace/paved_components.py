@@ -92,7 +92,7 @@ def _meet(tree, traits, inside, parents, pairs, limits, face, other):  # type: i
         depth -= 1
         a, b = pairs[depth, 0], pairs[depth, 1]
         box, box2 = limits[2 * depth], limits[2 * depth + 1]
-        apart = inside[a, 1] == 0.0 and child[a] < 0 or inside[b, 1] == 0.0 and child[b] < 0
+        apart = (inside[a, 1] == 0.0 and child[a] < 0) or (inside[b, 1] == 0.0 and child[b] < 0)
         for k in range(2):
             apart = apart or box[k, 0] >= box2[k, 1] or box2[k, 0] >= box[k, 1]
         if apart:

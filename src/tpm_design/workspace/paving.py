@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,7 +116,7 @@ class Paving:
 
     def __post_init__(self) -> None:
         mechanism, mode = self.target.mechanism, self.target.mode
-        self._geometry = mechanism.enclosed_geometry()
+        self._geometry = mechanism.enclosed_geometry({})
         legs, sides, determinants = constraint_counts(mechanism.geometry, mode.signs, 0.3, 0.4, 0.5)
         self._counts = (legs, sides, determinants if self.target.signs else 0)
         self._signs = np.array(self.target.signs or [1.0])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.arithmetic import inner
+from tpm_design.arithmetic import inner, kernel
 from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere
 
 BOX, CYLINDER, ELLIPSOID, POINTS = 0, 1, 2, 3
@@ -175,3 +175,13 @@ def surface_frame(region, x, y, z):  # type: ignore[no-untyped-def]
         a = perpendicular(n)
         return n, a, (n[1] * a[2] - n[2] * a[1], n[2] * a[0] - n[0] * a[2], n[0] * a[1] - n[1] * a[0])
     return axes
+
+
+@kernel
+def _signed_distance_at(region, x, y, z):  # type: ignore[no-untyped-def]
+    return signed_distance(region, x, y, z)
+
+
+def signed_distance_at(region: PlacedRegion, pose: tuple[float, float, float]) -> float:
+    """Distance (m) of one pose to the region's surface, negative inside."""
+    return float(_signed_distance_at(region, *pose))

@@ -1,0 +1,42 @@
+"""Numbers of one kind beside numbers of another: constants among Duals, numbers among Intervals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tpm_design.arithmetic.compilation import STRICT
+from tpm_design.arithmetic.dual import Dual, as_dual, is_dual, same_kind
+from tpm_design.arithmetic.interval import is_interval
+
+# isort: split
+from numba.extending import overload, register_jitable
+
+
+def lifted(x: Any, like: Any) -> Any:
+    """``x`` as a constant of the kind of ``like``: a Dual without slope, an Interval, or ``x`` itself."""
+    return as_dual(x, like) if isinstance(like, Dual) else same_kind(x, like)
+
+
+def _to_dual(x: Any, like: Any) -> Any:
+    return as_dual(x, like)
+
+
+def _to_kind(x: Any, like: Any) -> Any:
+    return same_kind(x, like)
+
+
+@overload(lifted, jit_options=STRICT, strict=False)
+def _overload_lifted(x: Any, like: Any) -> Any:
+    if is_dual(like):
+        return _to_dual
+    return _to_kind if not is_dual(x) or is_interval(like) else None
+
+
+@register_jitable(**STRICT)
+def replaced(triple: Any, position: int, value: Any) -> Any:
+    """The triple with ``value`` at one position, the others lifted to its kind."""
+    return (
+        value if position == 0 else lifted(triple[0], value),
+        value if position == 1 else lifted(triple[1], value),
+        value if position == 2 else lifted(triple[2], value),
+    )

@@ -1,0 +1,120 @@
+"""certificate.json: what was proved, and enough to prove it again by other means.
+
+The file holds the study, the machine, its tolerances, the region, every statement with the boxes of its
+proof, and which statements each requirement needs. Lengths in metres, angles in radians.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from tpm_design.certificates.settlement import Settlement, breaking_data
+from tpm_design.certificates.verdict import Requirement, Verdict
+from tpm_design.errors import UsageError
+from tpm_design.problem import Problem
+from tpm_design.workspace.region_geometry import BOX, CYLINDER, POINTS, PlacedRegion
+
+FORMAT = 1
+FILE = "certificate.json"
+LIBRARIES = ("tpm-design", "numpy", "numba")
+ASSUMPTIONS = (
+    "axis directions are exact: the tolerances are on lengths and ratios, of each limb by itself, and "
+    "misaligned axes are not covered",
+)
+
+
+def canonical(data: Any) -> bytes:
+    """The one way in which data are written to be hashed."""
+    return json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False).encode()
+
+
+def document(problem: Problem, study: Mapping[str, Any], study_hash: str, verdict: Verdict) -> dict[str, Any]:
+    """The certificate as plain data, its own hash included. ``study``: the resolved study."""
+    mechanism = verdict.context.mechanism
+    data: dict[str, Any] = {
+        "format": FORMAT,
+        "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
+        "study": dict(study),
+        "study_sha256": study_hash,
+        "design": dict(verdict.design),
+        "machine": {
+            "type": mechanism.kind.name,
+            "parameters": {name: list(values) for name, values in mechanism.parameters.items()},
+            "limits": {
+                name: list(value) if isinstance(value, list | tuple) else value
+                for name, value in problem.limits.items()
+            },
+        },
+        "mode": dict(problem.modes[str(verdict.design["mode"])]),
+        "tolerance": dict(verdict.tolerance),
+        "assumptions": list(ASSUMPTIONS),
+        "region": None if verdict.context.region is None else region_data(verdict.context.region),
+        "statements": [statement_data(settlement) for settlement in verdict.settlements],
+        "requirements": [requirement_data(requirement) for requirement in verdict.requirements],
+        "outcome": verdict.outcome,
+    }
+    # what was computed must be what is read back
+    data = dict(json.loads(json.dumps(data, ensure_ascii=False, allow_nan=False)))
+    return data | {"sha256": hashlib.sha256(canonical(data)).hexdigest()}
+
+
+def region_data(region: PlacedRegion) -> dict[str, Any]:
+    """A placed region as a certificate writes it."""
+    if region.form == POINTS:
+        return {"form": "points", "points": region.points.tolist()}
+    form = {BOX: "box", CYLINDER: "cylinder"}.get(region.form, "ellipsoid")
+    return {"form": form, "centre": list(region.centre), "half": list(region.half)}
+
+
+def statement_data(settlement: Settlement) -> dict[str, Any]:
+    """One statement with the covers of its proof."""
+    covers = [
+        {"root": [list(side) for side in cover.root], "tree": cover.tree} for cover in settlement.covers
+    ]
+    return settlement.demand.data(settlement.level) | {
+        "outcome": settlement.outcome,
+        "reason": settlement.reason,
+        "covers": covers,
+    }
+
+
+def requirement_data(requirement: Requirement) -> dict[str, Any]:
+    """One requirement with the numbers of its statements."""
+    goal = requirement.goal
+    return {
+        "label": goal.label,
+        "metric": goal.metric.name,
+        "options": {name: _plain(value) for name, value in goal.options.items()},
+        "min": goal.minimum,
+        "max": goal.maximum,
+        "outcome": requirement.outcome,
+        "slack": requirement.slack,
+        "statements": list(requirement.settlements),
+        "breaking": breaking_data(requirement.breaking),
+        "reason": requirement.reason,
+    }
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def write_document(path: Path, data: Mapping[str, Any]) -> None:
+    """Write a certificate, whole or not at all. Raises UsageError where it cannot be written."""
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        os.replace(part, path)
+    except OSError as error:
+        raise UsageError(
+            f"The certificate cannot be written: {error.strerror}.",
+            where=str(path),
+            remedy="Choose another place with --output.",
+        ) from None

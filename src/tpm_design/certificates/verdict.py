@@ -1,0 +1,125 @@
+"""All requirements of a study at one design, settled."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+from tpm_design.certificates.demands import Demand, NoProofError, demands
+from tpm_design.certificates.settlement import Breaking, Outcome, Settlement, settle
+from tpm_design.metrics.context import Context
+from tpm_design.problem import Design, Goal, Problem, design_context
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """One constraint of the study. ``settlements``: numbers of what it needs, in ``Verdict.settlements``.
+    ``slack`` (SI): the proved one, of the demand that carries the bound; None unless proved."""
+
+    goal: Goal
+    outcome: Outcome
+    slack: float | None
+    settlements: tuple[int, ...]
+    breaking: Breaking | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """``outcome``: "proved" if every requirement is, "refuted" if one is, else "undecided"."""
+
+    context: Context
+    design: Design
+    tolerance: Mapping[str, float]
+    settlements: tuple[Settlement, ...]
+    requirements: tuple[Requirement, ...]
+    outcome: Outcome
+    seconds: float
+
+    @property
+    def boxes(self) -> int:
+        """Boxes looked at in all proofs."""
+        return sum(settlement.boxes for settlement in self.settlements)
+
+
+def verdict(
+    problem: Problem,
+    design: Design,
+    tolerance: Mapping[str, float],
+    *,
+    boxes: int,
+    workers: int = 1,
+    with_slack: bool = True,
+) -> Verdict:
+    """Settle every constraint of the problem for all machines within ``tolerance`` (name → ±, SI, each limb
+    by itself), with at most ``boxes`` boxes for each proof. The result is the same for any number of workers.
+
+    Raises ParameterError where the design cannot be built.
+    """
+    began = time.perf_counter()
+    context = design_context(problem, design)
+    needs = [_needs(goal, context) for goal in problem.constraints]
+    # each statement once, however many requirements need it
+    distinct = list(dict.fromkeys(demand for need in needs if not isinstance(need, str) for demand in need))
+    if context.region is not None and distinct:
+        # what the threads share is computed before they start
+        _ = context.poses, context.lattice_determinants
+    with ThreadPoolExecutor(max_workers=max(1, workers)) as pool:
+        settlements = tuple(
+            pool.map(
+                lambda demand: settle(
+                    problem, demand, context, tolerance, boxes=boxes, with_slack=with_slack
+                ),
+                distinct,
+            )
+        )
+    numbers = {demand: number for number, demand in enumerate(distinct)}
+    requirements = tuple(
+        Requirement(goal, "undecided", None, (), None, need)
+        if isinstance(need, str)
+        else _requirement(goal, [numbers[demand] for demand in need], settlements)
+        for goal, need in zip(problem.constraints, needs, strict=True)
+    )
+    outcome = worst_outcome([requirement.outcome for requirement in requirements])
+    return Verdict(
+        context, design, tolerance, settlements, requirements, outcome, time.perf_counter() - began
+    )
+
+
+def worst_outcome(outcomes: list[Outcome]) -> Outcome:
+    """Refuted if any is, proved only if all are."""
+    if "refuted" in outcomes:
+        return "refuted"
+    return "undecided" if "undecided" in outcomes else "proved"
+
+
+def _needs(goal: Goal, context: Context) -> tuple[Demand, ...] | str:
+    kind = context.mechanism.kind
+    signs = [1.0] * len(kind.determinants)
+    if context.region is not None:
+        signs = [1.0 if low + high >= 0.0 else -1.0 for low, high in _ranges(context)]
+    try:
+        return demands(goal, kind, signs)
+    except NoProofError as reason:
+        return str(reason)
+
+
+def _ranges(context: Context) -> list[tuple[float, float]]:
+    """Least and greatest value of each determinant on the region's lattice."""
+    return [(float(values.min()), float(values.max())) for values in context.lattice_determinants]
+
+
+def _requirement(goal: Goal, numbers: list[int], settlements: tuple[Settlement, ...]) -> Requirement:
+    needed = [settlements[number] for number in numbers]
+    outcome = worst_outcome([settlement.outcome for settlement in needed])
+    if outcome == "proved":
+        return Requirement(goal, outcome, needed[-1].slack, tuple(numbers), None, "")
+    first = next(settlement for settlement in needed if settlement.outcome == outcome)
+    reason = f"{_named(first.demand)}: {first.reason}"
+    return Requirement(goal, outcome, None, tuple(numbers), first.breaking, reason)
+
+
+def _named(demand: Demand) -> str:
+    return f"{demand.name} {demand.kind}" if demand.name else demand.kind

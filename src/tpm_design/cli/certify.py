@@ -1,0 +1,222 @@
+"""The command that proves, and the one that checks a proof."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from tpm_design.certificates.document import FILE, document, write_document
+from tpm_design.certificates.tolerances import LargestTolerance, largest_tolerance
+from tpm_design.certificates.verdict import Requirement, Verdict, verdict
+from tpm_design.checker import check_certificate
+from tpm_design.cli.commands import chosen_design, design_rows, usable_processors
+from tpm_design.cli.guard import NOT_PROVED, complain
+from tpm_design.cli.text import table
+from tpm_design.errors import UsageError
+from tpm_design.problem import Design, Evaluation
+from tpm_design.report.words import asked, lengths_text
+from tpm_design.runs.tables import goal_unit
+from tpm_design.study import Study
+from tpm_design.study.study import Certification
+from tpm_design.units import si_unit
+
+NOTHING_ASKED = Certification({}, 400_000)
+
+
+def certify_one(
+    path: Path | None,
+    settings: Sequence[str],
+    max_tolerance: bool,
+    check: Path | None,
+    output: Path | None,
+    workers: int | None,
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> int | None:
+    if check is not None:
+        if path is not None or settings or max_tolerance or output is not None:
+            raise UsageError(
+                "--check stands alone.", where="certify", remedy="Write `tpm-design certify --check FILE`."
+            )
+        return _check(check, as_json=as_json)
+    if path is None:
+        raise UsageError(
+            "Nothing to certify.", where="certify", remedy="Name a study, a run folder, or --check FILE."
+        )
+    if workers is not None and workers < 1:
+        raise UsageError(
+            f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
+        )
+    study, design, assumptions = chosen_design(path, settings)
+    if not study.problem.constraints:
+        raise UsageError(
+            "The study has no constraints, so that there is nothing to prove.",
+            where=str(path),
+            remedy="Add `constraints:`, such as {metric: coverage, min: 1}.",
+        )
+    if assumptions and not quiet and not as_json:
+        print("Assumed: " + "; ".join(assumptions) + ".\n")
+    threads = workers or usable_processors()
+    if max_tolerance:
+        return _largest(study, design, threads, as_json=as_json, quiet=quiet)
+    asked_for = study.certification or NOTHING_ASKED
+    found = verdict(study.problem, design, asked_for.tolerance, boxes=asked_for.boxes, workers=threads)
+    target = output or (path / FILE if path.is_dir() and not settings else Path(FILE))
+    write_document(target, document(study.problem, study.resolved(), study.study_hash, found))
+    if as_json:
+        print(json.dumps(verdict_data(study, found) | {"certificate": str(target)}, ensure_ascii=False))
+    else:
+        if not quiet:
+            print(table(["design", "value", "searched in"], _design_rows(study, design)) + "\n")
+        print(verdict_text(study, found))
+        print(f"Certificate: {target}\nNext: tpm-design certify --check {target}")
+    return None if found.outcome == "proved" else NOT_PROVED
+
+
+def _design_rows(study: Study, design: Design) -> list[list[str]]:
+    bare = Evaluation(design, {}, {}, {}, {}, {}, 0.0, "feasible", "", 0.0)
+    return design_rows(study.problem, study.units, bare)
+
+
+def verdict_text(study: Study, found: Verdict) -> str:
+    """A verdict as a table and one sentence, in the study's units."""
+    rows = [_requirement_row(study, requirement) for requirement in found.requirements]
+    heads = ["requirement", "asked", "verdict", "proved to spare", "why"]
+    effort = f"{found.boxes} boxes, {found.seconds:.2g} s"
+    sentences = {
+        "proved": f"Proved {_scope(study, found)} ({effort}).",
+        "refuted": f"Refuted: at least one requirement is broken {_scope(study, found)} ({effort}).",
+        "undecided": f"Not proved {_scope(study, found)} ({effort}).",
+    }
+    return f"{table(heads, rows)}\n\n{sentences[found.outcome]}"
+
+
+def _scope(study: Study, found: Verdict) -> str:
+    tolerances = tolerance_text(study, found)
+    where = "at every pose of the region" if found.context.region is not None else "for the design"
+    if not tolerances:
+        return f"{where}, for the exact dimensions"
+    return f"{where}, for every machine within {tolerances} (each limb by itself, axis directions exact)"
+
+
+def tolerance_text(study: Study, found: Verdict, factor: float = 1.0) -> str:
+    """The tolerances in the study's units: ``f ± 0.1 mm, r ± 0.1 mm``; empty where there are none."""
+    parts = []
+    for name, bound in found.tolerance.items():
+        parameter = study.problem.kind.parameter(name)
+        unit = si_unit(parameter.dimension if parameter else "length")
+        if bound > 0.0:
+            parts.append(f"{name} ± {study.units.written(factor * bound, unit, digits=4)}")
+    return ", ".join(parts)
+
+
+def _requirement_row(study: Study, requirement: Requirement) -> list[str]:
+    goal = requirement.goal
+    unit = goal_unit(study.problem, goal)
+    spare = "" if requirement.slack is None else study.units.written(requirement.slack, unit, digits=3)
+    why = requirement.reason
+    if requirement.breaking is not None and requirement.breaking.pose is not None:
+        why = f"broken at {lengths_text(requirement.breaking.pose, study.units)}: {why}"
+    return [goal.label, asked(goal, study.units, unit), requirement.outcome, spare, why]
+
+
+def verdict_data(study: Study, found: Verdict) -> dict[str, Any]:
+    """A verdict for --json, in the study's units."""
+    requirements = {}
+    for requirement in found.requirements:
+        unit = goal_unit(study.problem, requirement.goal)
+        data: dict[str, Any] = {"outcome": requirement.outcome, "reason": requirement.reason}
+        if requirement.slack is not None:
+            data["slack"] = study.units.from_si(requirement.slack, unit)
+            data["unit"] = study.units.name(unit)
+        if requirement.breaking is not None and requirement.breaking.pose is not None:
+            data["pose"] = [study.units.from_si(value, "m") for value in requirement.breaking.pose]
+            data["pose_unit"] = study.units.name("m")
+        requirements[requirement.goal.label] = data
+    return {
+        "study": study.name,
+        "outcome": found.outcome,
+        "requirements": requirements,
+        "boxes": found.boxes,
+        "seconds": round(found.seconds, 3),
+    }
+
+
+def _largest(study: Study, design: Design, workers: int, *, as_json: bool, quiet: bool) -> int | None:
+    asked_for = study.certification or NOTHING_ASKED
+    if not any(bound > 0.0 for bound in asked_for.tolerance.values()):
+        raise UsageError(
+            "The study names no tolerances to scale.",
+            where="certify: tolerance:",
+            remedy="Add one, such as certify: {tolerance: {f: 0.1}}, ± in the study's units.",
+        )
+
+    def watch(factor: float, outcome: str) -> None:
+        if not (quiet or as_json):
+            complain(f"tolerances times {factor:.4g}: {outcome}")
+
+    found = largest_tolerance(
+        study.problem, design, asked_for.tolerance, boxes=asked_for.boxes, workers=workers, watch=watch
+    )
+    if as_json:
+        print(json.dumps(_largest_data(study, asked_for, found), ensure_ascii=False))
+    else:
+        print(_largest_text(study, asked_for, found))
+    return None if found.factor >= 1.0 else NOT_PROVED
+
+
+def _scaled(study: Study, asked_for: Certification, factor: float) -> dict[str, tuple[float, str]]:
+    """Tolerances times a factor: name → value and unit as the study writes them."""
+    scaled = {}
+    for name, bound in asked_for.tolerance.items():
+        parameter = study.problem.kind.parameter(name)
+        unit = si_unit(parameter.dimension if parameter else "length")
+        scaled[name] = (study.units.from_si(factor * bound, unit), study.units.name(unit))
+    return scaled
+
+
+def _largest_text(study: Study, asked_for: Certification, found: LargestTolerance) -> str:
+    if found.factor == 0.0:
+        return "No tolerance can be proved: the requirements are not proved for the exact dimensions either, or only just."
+    proved = ", ".join(
+        f"{name} ± {value:.4g} {unit}".rstrip()
+        for name, (value, unit) in _scaled(study, asked_for, found.factor).items()
+    )
+    limit = (
+        "nothing larger was tried"
+        if found.failed is None
+        else f"at {found.failed:.4g} times they are {found.outcome}"
+    )
+    return f"Largest tolerances proved: {proved} ({found.factor:.4g} times the study's; {limit})."
+
+
+def _largest_data(study: Study, asked_for: Certification, found: LargestTolerance) -> dict[str, Any]:
+    scaled = _scaled(study, asked_for, found.factor)
+    return {
+        "study": study.name,
+        "factor": found.factor,
+        "failed_factor": found.failed,
+        "outcome_there": found.outcome,
+        "tolerance": {name: {"value": value, "unit": unit} for name, (value, unit) in scaled.items()},
+    }
+
+
+def _check(path: Path, *, as_json: bool) -> int | None:
+    found = check_certificate(path)
+    if as_json:
+        print(
+            json.dumps(
+                {"certificate": str(path), "valid": found.valid, "faults": list(found.faults),
+                 "leaves": found.leaves, "seconds": round(found.seconds, 3)},
+                ensure_ascii=False,
+            )
+        )  # fmt: skip
+    else:
+        for fault in found.faults:
+            print(fault)
+        word = "Valid" if found.valid else "REJECTED"
+        print(f"{word}: {found.leaves} boxes checked in {found.seconds:.3g} s.")
+    return None if found.valid else NOT_PROVED
