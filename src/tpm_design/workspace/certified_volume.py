@@ -22,6 +22,8 @@ from tpm_design.workspace.volume import VolumeKind
 
 # digits are lost to underflow below it
 LEAST_MARGIN = 1e-290
+# of the gap that is allowed: what is left to the knowledge of how the parts are joined
+NEARLY = 0.98
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,10 @@ def _sum(
         lower, upper = (sum(values) for values in zip(*(p.bounds for p in pavings), strict=True))
         widest = max(pavings, key=lambda paving: paving.gap)
         left = limits.left(pavings)
-        if upper - lower <= rtol * lower or left < 2 or not widest.refine(left, executor):
+        if upper - lower <= rtol * lower or left < 2:
+            return lower, upper
+        goal = max(0.0, widest.gap - (upper - lower - rtol * lower))
+        if not widest.refine(goal, left, executor):
             return lower, upper
 
 
@@ -145,12 +150,14 @@ def _largest(
         if best.upper - lower <= rtol * lower:
             return lower, best.upper
         left = limits.left(pavings)
-        if left < 2 or not best.paving.refine(left, executor):
+        # parts are worth a look when the whole is known well enough, then whenever better by a third
+        volume, _ = best.paving.bounds
+        goal = min(NEARLY * rtol * volume, best.gap * 2.0 / 3.0)
+        if left < 2 or not best.paving.refine(goal, left, executor):
             break
         volume, most = best.paving.bounds
         best.upper = min(best.upper, most)
-        # parts are worth a look when the whole is known well enough, then whenever twice as well
-        if best.paving.gap <= min(rtol * volume, 0.5 * best.gap):
+        if best.paving.gap <= min(NEARLY * rtol * volume, best.gap * 2.0 / 3.0):
             best.look()
     for candidate in candidates:
         if candidate.upper > lower:

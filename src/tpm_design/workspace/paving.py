@@ -21,8 +21,10 @@ from tpm_design.workspace.equal_volume_charts import CHARTS_PER_OCTANT, largest_
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# share of the total gap that the boxes of one wave hold together
+# share of the total gap that the boxes of one wave hold together, at most; halving takes this much of it
 WAVE_SHARE = 0.5
+TAKEN = 0.6
+LEAST_WAVE_SHARE = 0.05
 # of the volume of all charts: more than the rounding of every sum of volumes
 SUM_ROUNDING = 1e-13
 BLOCK = 4096
@@ -155,9 +157,12 @@ class Paving:
     def gap(self) -> float:
         return float(self.leaves.gaps.sum())
 
-    def refine(self, most_boxes: int, executor: Executor | None = None) -> bool:
-        """One wave of at most ``most_boxes`` new boxes; False where nothing can be halved."""
-        chosen = largest(self.leaves.gaps, most_boxes // 2)
+    def refine(self, goal: float, most_boxes: int, executor: Executor | None = None) -> bool:
+        """One wave towards a total gap of ``goal`` (m³), of at most ``most_boxes`` new boxes; False where
+        nothing can be halved."""
+        gaps = self.leaves.gaps
+        excess = float(gaps.sum()) - goal
+        chosen = largest(gaps, max(LEAST_WAVE_SHARE * goal, excess / TAKEN), most_boxes // 2)
         if not chosen.any():
             return False
         parents, self.leaves = self.leaves.where(chosen), self.leaves.where(~chosen)
@@ -200,14 +205,16 @@ class Paving:
         return boxes.where((shares[:, 0] < 1.0) & (shares[:, 1] > 0.0))
 
 
-def largest(gaps: FloatArray, most: int) -> NDArray[np.bool_]:
-    """The boxes with the largest gaps, to a power of two, that hold ``WAVE_SHARE`` of all; ``most`` of them at
-    most, the first ones."""
+def largest(gaps: FloatArray, together: float, most: int) -> NDArray[np.bool_]:
+    """The boxes with the largest gaps, to an eighth, that hold ``together`` or ``WAVE_SHARE`` of all, whichever
+    is less; ``most`` of them at most, the first ones."""
     if not gaps.any():
         return np.zeros(len(gaps), np.bool_)
-    size = np.frexp(gaps)[1]
+    mantissa, exponent = np.frexp(gaps)
+    size = 4 * exponent.astype(np.int64) + (8.0 * mantissa - 4.0).astype(np.int64)
+    size[gaps == 0.0] = size[gaps > 0.0].min()
     held = np.bincount(size - size.min(), weights=gaps)[::-1].cumsum()
-    steps = int(np.searchsorted(held, WAVE_SHARE * held[-1]))
+    steps = int(np.searchsorted(held, min(together, WAVE_SHARE * held[-1])))
     chosen = np.asarray((size >= size.max() - steps) & (gaps > 0.0))
     if np.count_nonzero(chosen) > most:
         order = np.argsort(-gaps, kind="stable")[:most]
