@@ -122,7 +122,7 @@ def constant_form(value: Any) -> Any:
 
 @register_jitable(**STRICT)
 def coordinate_form(lo: float, hi: float, axis: int) -> Any:
-    """The ``axis``-th coordinate (0, 1, 2) of the box, which runs from lo to hi; their middle has to be exact."""
+    """The ``axis``-th coordinate (0, 1, 2) of the box, from lo to hi; their middle has to be exact."""
     half = 0.5 * (hi - lo)
     first, second = half if axis == 0 else 0.0, half if axis == 1 else 0.0
     return Affine(0.5 * (lo + hi), first, second, half if axis == 2 else 0.0, 0.0)

@@ -26,7 +26,8 @@ from numba.extending import overload, register_jitable
 def distal_link(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
     """(a, c, γ) of links f and r for a point with ρ² = α² + β²; elbow + has γ < 0.
 
-    Out of reach the elbow stays straight. In compiled code, for floats, Intervals, Duals of either, and Affine points.
+    Out of reach the elbow stays straight. In compiled code, for floats, Intervals, Duals of either, and
+    Affine points.
     """
     raise NotImplementedError
 

@@ -62,5 +62,5 @@ def share_below(level, first, second, third):  # type: ignore[no-untyped-def]
     # covers the rounding of the level's sums
     flat += 1e-15 * (abs(level) + flat + 3.0 * largest)
     if count == 0:
-        return 0.0 if level + flat > 0.0 else 1.0, 1.0 if level - flat < 0.0 else 0.0
+        return 1.0 if level + flat < 0.0 else 0.0, 1.0 if level - flat < 0.0 else 0.0
     return _share(level + flat, p, q, r, count, -1.0), _share(level - flat, p, q, r, count, 1.0)

@@ -21,6 +21,7 @@ from tpm_design.workspace.equal_volume_charts import pose_bounds, pose_forms
 MOST_CONSTRAINTS = 32
 REFUTED = -1
 EVERY_CORNER = 255
+THINNEST = 2.0**-40
 NO_SIGNS = np.ones(MOST_CONSTRAINTS)
 
 
@@ -64,7 +65,7 @@ def _settle_forms(forms, first, signs, margin, proved, open_forms):  # type: ign
 
 
 @inner
-def _settle(geometry, mode, counts, signs, margin, axis, octant, box, proved, open_forms):  # type: ignore[no-untyped-def]
+def settle(geometry, mode, counts, signs, margin, axis, octant, box, proved, open_forms):  # type: ignore[no-untyped-def]
     """Bits of the constraints proved on the box, or REFUTED."""
     legs, sides, determinants = counts
     every_side = _range(legs, sides)
@@ -171,6 +172,10 @@ def _axis_to_halve(proved, count, box, open_forms):  # type: ignore[no-untyped-d
     across, beyond = box[3] - box[2], box[5] - box[4]
     scale = (errors if errors > 0.0 else 1.0) / (radial + across + beyond)
     first, second, third = first + scale * radial, second + scale * across, third + scale * beyond
+    # beyond it, the middle of a coordinate would be rounded
+    first = first if box[1] - box[0] > THINNEST * box[1] else -1.0
+    second = second if across > THINNEST * box[3] else -1.0
+    third = third if beyond > THINNEST * box[5] else -1.0
     if first >= second and first >= third:
         return 0
     return 1 if second >= third else 2
@@ -215,7 +220,8 @@ def _closed_faces(proved, count, open_forms):  # type: ignore[no-untyped-def]
 def judge(geometry, mode, counts, signs, margin, charts, boxes, proved, shares, traits, start, stop):  # type: ignore[no-untyped-def]
     """Judge the boxes (N, 6) from ``start`` to ``stop`` in their ``charts`` (N, 4): axis and octant.
 
-    ``counts``: of leg margins, mode margins and determinants, 0 where these do not matter; ``signs`` of the latter.
+    ``counts``: of leg margins, mode margins and determinants (0 where these do not matter), ``signs`` and
+    ``margin`` of the latter.
     ``proved`` (N,): bits known before, and now; REFUTED: nothing is inside. ``shares`` (N, 2): bounds of the
     share that is inside. ``traits`` (N, 3): coordinate to halve, corners inside, closed faces.
     """
@@ -223,7 +229,7 @@ def judge(geometry, mode, counts, signs, margin, charts, boxes, proved, shares, 
     count = counts[0] + counts[1] + counts[2]
     for n in range(start, stop):
         octant = (float(charts[n, 1]), float(charts[n, 2]), float(charts[n, 3]))
-        bits = _settle(
+        bits = settle(
             geometry, mode, counts, signs, margin, charts[n, 0], octant, boxes[n], proved[n], open_forms
         )
         proved[n] = bits

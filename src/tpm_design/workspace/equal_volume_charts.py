@@ -84,6 +84,6 @@ def pose_forms(axis, octant, box):  # type: ignore[no-untyped-def]
 
 
 def largest_s(radius: float) -> float:
-    """Extent of s that holds all poses within ``radius``: of few digits, so that halving it 40 times is exact."""
+    """Extent of s that holds all poses within ``radius``; of few digits, so that its halves are exact."""
     mantissa, exponent = math.frexp(radius**3 / 3.0 * (1.0 + 1e-9))
     return math.ldexp(math.ceil(mantissa * 1024.0) / 1024.0, exponent)

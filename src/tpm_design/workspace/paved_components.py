@@ -1,8 +1,8 @@
 """The largest connected part of a paved set, from below and from above.
 
 From below: parts proved inside that meet in a corner of the face their boxes share; each part is convex. From
-above: boxes that may hold poses of the set, joined by faces on which no constraint is proved negative. The set
-is taken as open, so that ways through it need not pass edges or corners of boxes.
+above: boxes that may hold poses of the set, joined by faces on which no constraint is proved negative. The
+set is taken as open, so that ways through it need not pass edges or corners of boxes.
 """
 
 from __future__ import annotations
@@ -70,7 +70,9 @@ def _step(tree, pairs, limits, depth, which, axis, side, along):  # type: ignore
     k = 0 if cut == along[0] else 1
     for w in range(2):
         pairs[depth + 1, w] = pairs[depth, w]
-        limits[2 * depth + 2 + w] = limits[2 * depth + w]
+        for j in range(2):
+            for end in range(2):
+                limits[2 * depth + 2 + w, j, end] = limits[2 * depth + w, j, end]
     pairs[depth, which], pairs[depth + 1, which] = child[node], child[node] + 1
     _halve(limits, row, k, False)
     _halve(limits, row + 2, k, True)
@@ -78,7 +80,7 @@ def _step(tree, pairs, limits, depth, which, axis, side, along):  # type: ignore
 
 
 @inner
-def _meet(tree, traits, inside, parents, pairs, limits, face, other):  # type: ignore[no-untyped-def]
+def _meet(tree, traits, inside, parents, pairs, limits, point, face, other):  # type: ignore[no-untyped-def]
     """Join the leaves below the first pair that touch: ``face``, ``other``: axis, side and the axes along
     the face of the two boxes, whose limits along these are in ``limits``."""
     child, _ = tree
@@ -87,7 +89,6 @@ def _meet(tree, traits, inside, parents, pairs, limits, face, other):  # type: i
     axis, side, along = face
     axis2, side2, along2 = other
     depth = 1
-    point = np.empty(2)
     while depth > 0:
         depth -= 1
         a, b = pairs[depth, 0], pairs[depth, 1]
@@ -130,7 +131,7 @@ def _largest_parts(child, halved, corners, closed, inside, roots, extent, contac
     size = child.size
     lower, upper = np.arange(size), np.arange(size)
     pairs = np.empty((STACK, 2), np.int64)
-    limits = np.empty((2 * STACK, 2, 2))
+    limits, point = np.empty((2 * STACK, 2, 2)), np.empty(2)
     boxes = np.empty((size, 6))
     for root in range(roots):
         boxes[root] = 0.0
@@ -143,14 +144,15 @@ def _largest_parts(child, halved, corners, closed, inside, roots, extent, contac
             second = 1 if axis == 2 else 2
             middle = 0.5 * (boxes[node, 2 * axis] + boxes[node, 2 * axis + 1])
             for half in range(2):
-                boxes[child[node] + half] = boxes[node]
+                for j in range(6):
+                    boxes[child[node] + half, j] = boxes[node, j]
                 boxes[child[node] + half, 2 * axis + 1 - half] = middle
                 pairs[0, half] = child[node] + half
                 for end in range(2):
                     limits[half, 0, end] = boxes[node, 2 * first + end]
                     limits[half, 1, end] = boxes[node, 2 * second + end]
             along = (first, second)
-            _meet(tree, traits, inside, parents, pairs, limits, (axis, 1, along), (axis, 0, along))
+            _meet(tree, traits, inside, parents, pairs, limits, point, (axis, 1, along), (axis, 0, along))
     for n in range(contacts.shape[0]):
         for w in range(2):
             pairs[0, w] = contacts[n, 5 * w]
@@ -158,7 +160,7 @@ def _largest_parts(child, halved, corners, closed, inside, roots, extent, contac
             limits[w, 1, 0], limits[w, 1, 1] = 0.0, 1.0
         face = (contacts[n, 1], contacts[n, 2], (contacts[n, 3], contacts[n, 4]))
         other = (contacts[n, 6], contacts[n, 7], (contacts[n, 8], contacts[n, 9]))
-        _meet(tree, traits, inside, parents, pairs, limits, face, other)
+        _meet(tree, traits, inside, parents, pairs, limits, point, face, other)
     return _largest(lower, child, inside, 0), _largest(upper, child, inside, 1)
 
 

@@ -32,8 +32,8 @@ BLOCK = 4096
 
 @dataclass(frozen=True)
 class PavedSet:
-    """The poses of a mode that reach allows, and where ``signs`` (D,) are not empty sign · determinant > margin
-    for each determinant."""
+    """The poses of a mode that reach allows; where ``signs`` (D,) are given, those with sign · determinant >
+    margin for each determinant."""
 
     mechanism: Mechanism
     mode: Mode
@@ -44,7 +44,8 @@ class PavedSet:
 @dataclass
 class Leaves:
     """Undecided boxes: ``node`` (N,) numbers in the tree, ``charts`` (N, 4), ``boxes`` (N, 6), ``proved``
-    (N,), ``volumes`` (N,) of the whole boxes (m³), ``inside`` (N, 2) bounds of what is inside (m³), ``axis``."""
+    (N,) bits, ``volumes`` (N,) of the whole boxes (m³), ``inside`` (N, 2) bounds of what is inside (m³),
+    ``axis`` (N,) to halve."""
 
     node: IntArray
     charts: IntArray
@@ -165,12 +166,16 @@ class Paving:
         chosen = largest(gaps, max(LEAST_WAVE_SHARE * goal, excess / TAKEN), most_boxes // 2)
         if not chosen.any():
             return False
+        self.halve(chosen, executor)
+        return True
+
+    def halve(self, chosen: NDArray[np.bool_], executor: Executor | None = None) -> None:
+        """Halve the chosen ones of the undecided boxes."""
         parents, self.leaves = self.leaves.where(chosen), self.leaves.where(~chosen)
         first = self.tree.size
         self.tree.child[parents.node] = first + 2 * np.arange(len(parents.node))
         self.tree.axis[parents.node] = parents.axis
         self.leaves = self.leaves.and_also(self._judged(halves(parents), executor))
-        return True
 
     def _judged(self, boxes: Leaves, executor: Executor | None) -> Leaves:
         """Judge new boxes, put them into the tree and return those that are undecided."""
@@ -206,8 +211,8 @@ class Paving:
 
 
 def largest(gaps: FloatArray, together: float, most: int) -> NDArray[np.bool_]:
-    """The boxes with the largest gaps, to an eighth, that hold ``together`` or ``WAVE_SHARE`` of all, whichever
-    is less; ``most`` of them at most, the first ones."""
+    """The boxes with the largest gaps, to a quarter, that hold ``together`` or ``WAVE_SHARE`` of all,
+    whichever is less; ``most`` of them at most."""
     if not gaps.any():
         return np.zeros(len(gaps), np.bool_)
     mantissa, exponent = np.frexp(gaps)
