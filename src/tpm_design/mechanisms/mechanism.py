@@ -39,7 +39,7 @@ class Mechanism(ABC):
         """The working mode named by sign strings, e.g. ``{"octant": "+++", "elbows": "+-+"}``."""
 
     def single_octants(self, mode: Mode) -> tuple[Mode, ...]:
-        """Modes that make up ``mode`` between coordinate planes that no aspect crosses; itself without such."""
+        """Modes that make up ``mode`` between planes that no aspect crosses; itself where there are none."""
         return (mode,)
 
     @abstractmethod
