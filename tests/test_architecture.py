@@ -24,6 +24,7 @@ MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__
 ROOMS = (
     "errors",
     "units",
+    "checker",
     "arithmetic",
     "mechanisms",
     "workspace",
@@ -43,6 +44,7 @@ ROOMS = (
 ONLY = {
     "errors": set(),
     "units": set(),
+    "checker": {"errors"},
     "arithmetic": {"errors"},
     "optimizers": {"errors"},
     "design_space": {"problem"},
@@ -56,6 +58,7 @@ OWNERS = {
     "typer": {"cli"},
     "rich": {"cli"},
     "nlopt": {"optimizers"},
+    "flint": {"checker"},
     "matplotlib": {"report"},
 }
 """Libraries that only these rooms know."""

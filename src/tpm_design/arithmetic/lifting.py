@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tpm_design.arithmetic.compilation import STRICT
-from tpm_design.arithmetic.dual import Dual, as_dual, is_dual, same_kind
+from tpm_design.arithmetic.dual import Dual, as_dual, is_dual, same_kind, written
 from tpm_design.arithmetic.interval import is_interval
 
 # isort: split
@@ -30,6 +30,20 @@ def _overload_lifted(x: Any, like: Any) -> Any:
     if is_dual(like):
         return _to_dual
     return _to_kind if not is_dual(x) or is_interval(like) else None
+
+
+def seeded(values: Any, like: Any) -> Any:
+    """``variables(values)`` with as many derivatives as the Dual ``like`` has, the last ones 0."""
+    raise NotImplementedError
+
+
+@overload(seeded, jit_options=STRICT, strict=False)
+def _overload_seeded(values: Any, like: Any) -> Any:
+    duals = [
+        f"Dual(values[{i}], ({', '.join(f'same_kind({float(i == j)}, values[0])' for j in range(like.count))},))"
+        for i in range(values.count)
+    ]
+    return written("seeded", "values, like", f"({', '.join(duals)},)", globals())
 
 
 @register_jitable(**STRICT)

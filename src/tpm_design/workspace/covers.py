@@ -14,13 +14,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.arithmetic import Interval, formula, inner, kernel, variables
-from tpm_design.arithmetic.lifting import lifted
+from tpm_design.arithmetic.lifting import lifted, seeded
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace import statements
@@ -86,6 +86,58 @@ def _worst_end(slope, lo, hi):  # type: ignore[no-untyped-def]
     return middle, (Interval(max(hi - middle, middle - lo), 0.0 + max(hi - middle, middle - lo)) * 1.0).hi
 
 
+class Exact(NamedTuple):
+    """One machine."""
+
+    factor: float = 0.0
+
+
+class Toleranced(NamedTuple):
+    """Every machine of the geometry's intervals."""
+
+    factor: float = 1.0
+
+
+def slopes(
+    tolerances: Any, statement: Any, geometry: Any, mode: Any, guide: Any, x: Any, y: Any, z: Any
+) -> Any:
+    """Slacks as Duals over the pose, and over each limb's parameters where these have tolerances."""
+    raise NotImplementedError
+
+
+def worst_machine(tolerances: Any, geometry: Any, limb_slopes: Any, number: Any) -> Any:
+    """The machine where slack ``number`` is least, as far as slopes tell, and what the others may take."""
+    raise NotImplementedError
+
+
+@formula(slopes, Exact)
+def _slopes_of_one_machine(tolerances, statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
+    return statements.slacks(statement, geometry, mode, guide, *variables((x, y, z))), 0.0
+
+
+@formula(slopes, Toleranced)
+def _slopes_of_machines(tolerances, statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
+    limb_slopes = (
+        _limb_slopes(statement, geometry, mode, guide, 0, x, y, z),
+        _limb_slopes(statement, geometry, mode, guide, 1, x, y, z),
+        _limb_slopes(statement, geometry, mode, guide, 2, x, y, z),
+    )
+    return _pose_slopes(statement, geometry, mode, guide, x, y, z), limb_slopes
+
+
+@formula(worst_machine, Exact)
+def _the_machine(tolerances, geometry, limb_slopes, number):  # type: ignore[no-untyped-def]
+    return geometry, 0.0
+
+
+@formula(worst_machine, Toleranced)
+def _the_worst_machine(tolerances, geometry, limb_slopes, number):  # type: ignore[no-untyped-def]
+    machine, first = _at_worst_machine(geometry, 0, limb_slopes, number)
+    machine, second = _at_worst_machine(machine, 1, limb_slopes, number)
+    machine, third = _at_worst_machine(machine, 2, limb_slopes, number)
+    return machine, (Interval(first, first) + second + third).hi
+
+
 @inner
 def _limb_slopes(statement, geometry, mode, guide, limb, x, y, z):  # type: ignore[no-untyped-def]
     """Derivatives of the slacks by one limb's parameters."""
@@ -93,6 +145,18 @@ def _limb_slopes(statement, geometry, mode, guide, limb, x, y, z):  # type: igno
     moved = equations.with_limb_parameters(geometry, limb, values)
     like = values[0]
     return statements.slacks(statement, moved, mode, guide, lifted(x, like), lifted(y, like), lifted(z, like))
+
+
+@inner
+def _pose_slopes(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
+    """Derivatives of the slacks by the pose, in the type that ``_limb_slopes`` has: compiled once."""
+    values = variables(equations.limb_parameters(geometry, 0))
+    like = values[0]
+    constants = values
+    for q in range(len(values)):
+        constants = tuple_setitem(constants, q, lifted(values[q].value, like))
+    still = equations.with_limb_parameters(geometry, 0, constants)
+    return statements.slacks(statement, still, mode, guide, *seeded((x, y, z), like))
 
 
 @inner
@@ -111,7 +175,7 @@ def _at_worst_machine(geometry, limb, slopes, number):  # type: ignore[no-untype
 
 
 @inner
-def _bound_at_worst(statement, geometry, mode, tolerant, guide, box, pose_slopes, limb_slopes, number):  # type: ignore[no-untyped-def]
+def _bound_at_worst(statement, geometry, mode, tolerances, guide, box, pose_slopes, limb_slopes, number):  # type: ignore[no-untyped-def]
     """Lower bound of slack ``number`` over the box and all machines, by the mean value theorem."""
     x0, hx = _worst_end(pose_slopes[number].derivatives[0], box[0, 0], box[0, 1])
     y0, hy = _worst_end(pose_slopes[number].derivatives[1], box[1, 0], box[1, 1])
@@ -119,20 +183,15 @@ def _bound_at_worst(statement, geometry, mode, tolerant, guide, box, pose_slopes
     taken = Interval(0.0, 0.0) + _slope_bound(pose_slopes[number].derivatives[0], hx)
     taken = taken + _slope_bound(pose_slopes[number].derivatives[1], hy)
     taken = taken + _slope_bound(pose_slopes[number].derivatives[2], hz)
-    machine = geometry
-    if tolerant is not None:
-        machine, first = _at_worst_machine(machine, 0, limb_slopes, number)
-        machine, second = _at_worst_machine(machine, 1, limb_slopes, number)
-        machine, third = _at_worst_machine(machine, 2, limb_slopes, number)
-        taken = taken + first + second + third
+    machine, left = worst_machine(tolerances, geometry, limb_slopes, number)
     values = statements.slacks(
         statement, machine, mode, guide, Interval(x0, x0), Interval(y0, y0), Interval(z0, z0)
     )
-    return (values[number] - taken).lo
+    return (values[number] - (taken + left)).lo
 
 
 @inner
-def _examine(statement, geometry, nominal, mode, tolerant, box, known):  # type: ignore[no-untyped-def]
+def _examine(statement, geometry, nominal, mode, tolerances, box, known):  # type: ignore[no-untyped-def]
     """Verdict on a box, the bits of the slacks proved on it (``known`` ones are not looked at again), and
     the axis to bisect."""
     x, y, z = Interval(box[0, 0], box[0, 1]), Interval(box[1, 0], box[1, 1]), Interval(box[2, 0], box[2, 1])
@@ -150,30 +209,23 @@ def _examine(statement, geometry, nominal, mode, tolerant, box, known):  # type:
         return PROVED, known, 0
     if unreachable(statement, geometry, mode, x, y, z):
         return NOWHERE, known, 0
-    pose_slopes = statements.slacks(statement, geometry, mode, guide, *variables((x, y, z)))
-    limb_slopes = None
-    if tolerant is not None:
-        limb_slopes = (
-            _limb_slopes(statement, geometry, mode, guide, 0, x, y, z),
-            _limb_slopes(statement, geometry, mode, guide, 1, x, y, z),
-            _limb_slopes(statement, geometry, mode, guide, 2, x, y, z),
-        )
+    pose_slopes, limb_slopes = slopes(tolerances, statement, geometry, mode, guide, x, y, z)
     weights = (0.0, 0.0, 0.0)
     for number in range(len(natural)):
         if known & (1 << number):
             continue
         bound = _bound_at_worst(
-            statement, geometry, mode, tolerant, guide, box, pose_slopes, limb_slopes, number
+            statement, geometry, mode, tolerances, guide, box, pose_slopes, limb_slopes, number
         )
         if bound > 0.0:
             known |= 1 << number
             pending -= 1
             continue
-        slopes = pose_slopes[number].derivatives
+        derivatives = pose_slopes[number].derivatives
         shares = (
-            _slope_bound(slopes[0], half[0]),
-            _slope_bound(slopes[1], half[1]),
-            _slope_bound(slopes[2], half[2]),
+            _slope_bound(derivatives[0], half[0]),
+            _slope_bound(derivatives[1], half[1]),
+            _slope_bound(derivatives[2], half[2]),
         )
         total = shares[0] + shares[1] + shares[2]
         if 0.0 < total < math.inf:
@@ -208,7 +260,7 @@ def _share(box, root):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _cover(statement, geometry, nominal, mode, tolerant, region, distance, root, used, letters, culprit):  # type: ignore[no-untyped-def]
+def _cover(statement, geometry, nominal, mode, tolerances, region, distance, root, used, letters, culprit):  # type: ignore[no-untyped-def]
     """Write the tree of a cover of ``root`` (3, 2) into ``letters``; how it ended and its length.
 
     ``culprit`` (3, 2): the box that was given up. ``used``: letters that are already there.
@@ -229,7 +281,7 @@ def _cover(statement, geometry, nominal, mode, tolerant, region, distance, root,
             letters[used] = LETTERS[OUTSIDE]
             used += 1
             continue
-        verdict, known, axis = _examine(statement, geometry, nominal, mode, tolerant, box, known)
+        verdict, known, axis = _examine(statement, geometry, nominal, mode, tolerances, box, known)
         if verdict != OPEN:
             letters[used] = LETTERS[verdict]
             used += 1
@@ -288,7 +340,7 @@ def prove(
     """Prove ``statement`` at every pose within ``distance`` (m) of the region and for every machine within
     ``tolerance`` (name → ±, SI, each limb by itself), looking at no more than ``boxes`` boxes."""
     geometry = mechanism.enclosed_geometry(tolerance)
-    tolerant = 1 if any(bound > 0.0 for bound in tolerance.values()) else None
+    tolerances = Toleranced() if any(bound > 0.0 for bound in tolerance.values()) else Exact()
     letters = np.empty(boxes, dtype=np.uint8)
     culprit = np.empty((3, 2))
     covers: list[Cover] = []
@@ -296,7 +348,7 @@ def prove(
     for root in roots(region, distance):
         before = used
         ended, used = _cover(
-            statement, geometry, mechanism.geometry, mode.signs, tolerant, region, distance, root, used,
+            statement, geometry, mechanism.geometry, mode.signs, tolerances, region, distance, root, used,
             letters, culprit,
         )  # fmt: skip
         if ended != ENDED_PROVED:

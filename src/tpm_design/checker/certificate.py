@@ -1,0 +1,204 @@
+"""``certify --check``: a certificate's hash, its agreement with its study, and every proof in it again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tpm_design.checker.agreement import disagreements
+from tpm_design.checker.breaking import not_broken
+from tpm_design.checker.claims import (
+    OUTCOMES,
+    Claim,
+    Machine,
+    Requirement,
+    read_claim,
+    read_machine,
+    read_region,
+    read_requirement,
+)
+from tpm_design.checker.cover import leaves
+from tpm_design.checker.fields import AlteredError, Fields, canonical_sha256, read_certificate
+from tpm_design.checker.proof import Machines, never_reached, proved, sum_of_links
+from tpm_design.checker.regions import Box, Domain, Region
+from tpm_design.checker.requirements import proved_slack, unproved
+from tpm_design.checker.statements import Length, Locus, Statement
+from tpm_design.errors import UsageError
+
+FORMAT = 1
+SLACK_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """``valid``: everything the certificate says is proved was proved again. ``lines``: what was checked,
+    ``faults``: what is wrong. ``leaves``: boxes proved again."""
+
+    valid: bool
+    lines: tuple[str, ...]
+    faults: tuple[str, ...]
+    leaves: int
+    seconds: float
+
+
+def check_certificate(path: str | Path) -> CheckResult:
+    """Checks a ``certificate.json``. Raises UsageError where the file is none of a format known here."""
+    began = time.perf_counter()
+    try:
+        certificate = read_certificate(Path(path))
+    except AlteredError as error:
+        return CheckResult(False, (), (f"altered: {error}",), 0, time.perf_counter() - began)
+    check = _Check()
+    check.run(certificate)
+    return CheckResult(
+        not check.faults, tuple(check.lines), tuple(check.faults), check.leaves, time.perf_counter() - began
+    )
+
+
+class _Check:
+    """One check as it goes on."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.faults: list[str] = []
+        self.leaves = 0
+
+    def run(self, certificate: Fields) -> None:
+        body = {key: value for key, value in certificate.data.items() if key != "sha256"}
+        if certificate.text("sha256") != canonical_sha256(body):
+            self.faults.append("altered: the SHA-256 of the contents is not the one written")
+            return
+        if certificate.value("format") != FORMAT:
+            raise UsageError(
+                f"the certificate's format is {certificate.value('format')!r}, not {FORMAT}",
+                where=certificate.file,
+                remedy="Check it with the version of tpm-design that wrote it.",
+            )
+        certificate.fields("versions")
+        if certificate.text("study_sha256") != canonical_sha256(certificate.fields("study").data):
+            self.faults.append("study_sha256 is not that of the study")
+        machine, region = read_machine(certificate), read_region(certificate)
+        claims = [read_claim(entry) for entry in certificate.entries("statements")]
+        requirements = [read_requirement(entry, len(claims)) for entry in certificate.entries("requirements")]
+        outcome = certificate.text("outcome", OUTCOMES)
+        self._assumptions(certificate)
+        self.faults += disagreements(certificate, machine, region, requirements)
+        if self.faults:
+            return
+        machines = machine.within_tolerance()
+        for index, claim in enumerate(claims):
+            fault = self._claim(claim, machines, region)
+            self.lines.append(f"statement {index}, {claim.statement}: {fault or claim.outcome}")
+            if fault:
+                self.faults.append(f"statement {index}, {claim.statement}: {fault}")
+        for requirement in requirements:
+            self._requirement(requirement, claims, machine, region)
+        self._outcome(outcome, requirements)
+
+    def _assumptions(self, certificate: Fields) -> None:
+        texts = certificate.items("assumptions")
+        if not any(isinstance(text, str) and "axis directions are exact" in text for text in texts):
+            self.faults.append("assumptions do not say that axis directions are exact")
+
+    def _claim(self, claim: Claim, machines: Machines, region: Region | None) -> str | None:
+        """What is wrong with a statement; None where nothing is."""
+        statement = claim.statement
+        if isinstance(statement, Length):
+            return _length_fault(statement, machines) if claim.outcome == "proved" else None
+        if region is None:
+            return "there is no region that it could speak of"
+        if claim.outcome != "proved" and not claim.covers:
+            return None
+        distance = statement.distance if isinstance(statement, Locus) else 0.0
+        domains = [Domain(body, distance) for body in region.parts]
+        return self._covers(claim, statement, machines, domains)
+
+    def _covers(
+        self, claim: Claim, statement: Statement, machines: Machines, domains: list[Domain]
+    ) -> str | None:
+        roots = [cover.root for cover in claim.covers]
+        if len(domains) == 1:
+            whole = domains[0].covered_by(roots)
+            paired = [(cover, domains[0]) for cover in claim.covers]
+        else:
+            if len(roots) != len(domains):
+                return f"there are {len(roots)} covers for {len(domains)} poses"
+            whole = all(domain.covered_by([root]) for domain, root in zip(domains, roots, strict=True))
+            paired = list(zip(claim.covers, domains, strict=True))
+        if not whole:
+            return "the covers leave out a part of the poses it speaks of"
+        for cover, domain in paired:
+            try:
+                for box, letter in leaves(cover):
+                    if letter == "u":
+                        if claim.outcome == "proved":
+                            return f"it has an undecided leaf {_shown(box)}"
+                        continue
+                    self.leaves += 1
+                    if not _leaf_holds(statement, machines, domain, box, letter):
+                        return f"the leaf {letter} {_shown(box)} could not be proved again"
+            except ValueError as error:
+                return str(error)
+        return None
+
+    def _requirement(
+        self, requirement: Requirement, claims: list[Claim], machine: Machine, region: Region | None
+    ) -> None:
+        name = f"requirement {requirement.label}"
+        self.lines.append(f"{name}: {requirement.outcome}")
+        self.faults += [
+            f"{name}: {fault}" for fault in _requirement_faults(requirement, claims, machine, region)
+        ]
+
+    def _outcome(self, outcome: str, requirements: list[Requirement]) -> None:
+        outcomes = {requirement.outcome for requirement in requirements}
+        due = "refuted" if "refuted" in outcomes else "undecided" if "undecided" in outcomes else "proved"
+        if outcome != due:
+            self.faults.append(f"outcome is {outcome}, by its requirements it is {due}")
+
+
+def _leaf_holds(statement: Statement, machines: Machines, domain: Domain, box: Box, letter: str) -> bool:
+    if letter == "o":
+        return domain.outside(box)
+    if letter == "n":
+        return isinstance(statement, Locus) and never_reached(machines, box)
+    return proved(statement, machines, domain, box)
+
+
+def _length_fault(statement: Length, machines: Machines) -> str | None:
+    floor, ceiling = statement.floor, statement.ceiling
+    if floor is not None and not sum_of_links(machines, False) >= floor:
+        return "the links may be shorter"
+    if ceiling is not None and not sum_of_links(machines, True) <= ceiling:
+        return "the links may be longer"
+    return None
+
+
+def _requirement_faults(
+    requirement: Requirement, claims: list[Claim], machine: Machine, region: Region | None
+) -> Iterator[str]:
+    named = [claims[index] for index in requirement.statements]
+    all_proved = all(claim.outcome == "proved" for claim in named)
+    separate = region is not None and len(region.parts) > 1
+    lacking = unproved(requirement, [c.statement for c in named if c.outcome == "proved"], separate)
+    if requirement.outcome == "proved":
+        if lacking is not None:
+            yield lacking
+        elif not all_proved:
+            yield "it names a statement that is not proved"
+        elif requirement.slack is not None:
+            last = proved_slack(requirement, named[-1].statement)
+            if requirement.slack > last + SLACK_ROUNDING:
+                yield f"its slack {requirement.slack} is more than the {last} that is proved"
+    elif lacking is None and all_proved:
+        yield f"it is said to be {requirement.outcome}, and its statements prove it"
+    elif requirement.outcome == "refuted":
+        reason = not_broken(requirement, machine, region)
+        if reason is not None:
+            yield reason
+
+
+def _shown(box: Box) -> str:
+    return " × ".join(f"[{low:.6g}, {high:.6g}]" for low, high in box)

@@ -1,0 +1,182 @@
+"""Proof that a statement holds on a box: every pose of it, every machine within the tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from flint import arb
+
+from tpm_design.checker.balls import Enclosure
+from tpm_design.checker.regions import Box, Domain
+from tpm_design.checker.statements import Goal, Locus, Reach, Statement, outside_goals
+from tpm_design.checker.uru import AXES, LIMBS, Configuration, JointRange, Mode
+
+ONE = arb(1)
+BISECTIONS = 15
+"""How often a leaf whose bounds are too loose may be halved, one half of one half after the other."""
+
+
+class Span:
+    """All the values of one variable: a ball around them, their ends, middle and half width."""
+
+    __slots__ = ("centre", "high", "low", "radius", "whole")
+
+    def __init__(self, low: arb, high: arb) -> None:
+        self.low, self.high = low, high
+        self.whole = low.union(high)
+        self.centre = self.whole.mid()
+        self.radius = (self.whole - self.centre).abs_upper()
+
+
+@dataclass(frozen=True)
+class Machines:
+    """Every machine within the tolerance: the spans of its sizes, ``delta1`` … ``k3``."""
+
+    mode: Mode
+    limits: tuple[JointRange, ...]
+    sizes: Mapping[str, Span]
+
+
+def natural(machines: Machines, spans: Mapping[str, Span]) -> Configuration:
+    variables = {name: Enclosure(span.whole, {}) for name, span in spans.items()}
+    return Configuration(machines.mode, machines.limits, variables)
+
+
+def graded(machines: Machines, spans: Mapping[str, Span]) -> Configuration:
+    """With derivatives in everything that varies, and the configuration in the middle."""
+    centre = {name: Enclosure(span.centre, {}) for name, span in spans.items()}
+    middle = Configuration(machines.mode, machines.limits, centre)
+    variables = {
+        name: Enclosure(span.whole, {name: ONE} if span.radius > 0 else {}) for name, span in spans.items()
+    }
+    return Configuration(machines.mode, machines.limits, variables, middle)
+
+
+def positive(goal: Goal, slopes: Configuration, machines: Machines, spans: Mapping[str, Span]) -> bool:
+    """Whether a goal is > 0 on the whole box, by its derivatives there.
+
+    A variable in which the goal rises or falls takes the end where it is least; the others take their middle
+    and the mean value theorem the rest.
+    """
+    over = goal(slopes)
+    if over.value > 0:
+        return True
+    point = {name: span.centre for name, span in spans.items()}
+    loss = arb(0)
+    for name, slope in over.slope.items():
+        span = spans[name]
+        if slope >= 0:
+            point[name] = span.low
+        elif slope <= 0:
+            point[name] = span.high
+        else:
+            loss += slope.abs_upper() * span.radius
+    variables = {name: Enclosure(value, {}) for name, value in point.items()}
+    return bool(goal(Configuration(machines.mode, machines.limits, variables)).value - loss > 0)
+
+
+def all_positive(statement: Statement, machines: Machines, spans: Mapping[str, Span]) -> bool:
+    whole = natural(machines, spans)
+    if all(goal(whole).value > 0 for goal in statement.goals(whole)):
+        return True
+    slopes = graded(machines, spans)
+    # goals of one configuration belong together: they may share a scale
+    return all(
+        goal(whole).value > 0 or positive(goal, slopes, machines, spans) for goal in statement.goals(slopes)
+    )
+
+
+def out_of_reach(machines: Machines, box: Box, spans: Mapping[str, Span]) -> bool:
+    """Whether one margin of reach or of the mode is < 0 on the whole box for every machine."""
+    for (low, high), side in zip(box, machines.mode.octant, strict=True):
+        if (side > 0 and high < 0.0) or (side < 0 and low > 0.0):
+            return True
+    whole = natural(machines, spans)
+    goals = outside_goals(whole)
+    if any(goal(whole).value > 0 for goal in goals):
+        return True
+    slopes = graded(machines, spans)
+    return any(positive(goal, slopes, machines, spans) for goal in goals)
+
+
+def in_octant(mode: Mode, box: Box) -> bool:
+    return all(
+        side == 0 or (low >= 0.0 if side > 0 else high <= 0.0)
+        for (low, high), side in zip(box, mode.octant, strict=True)
+    )
+
+
+def spans_of(machines: Machines, box: Box) -> dict[str, Span]:
+    spans = dict(machines.sizes)
+    for axis, (low, high) in zip(AXES, box, strict=True):
+        spans[axis] = Span(arb(low), arb(high))
+    return spans
+
+
+def settled(statement: Statement, machines: Machines, domain: Domain, box: Box) -> bool:
+    """Whether a box needs no further look: the statement holds on it, or it says nothing about it."""
+    spans = spans_of(machines, box)
+    if isinstance(statement, Reach) and not in_octant(machines.mode, box):
+        return domain.outside(box)
+    if all_positive(statement, machines, spans) or domain.outside(box):
+        return True
+    return isinstance(statement, Locus) and out_of_reach(machines, box, spans)
+
+
+def halves(box: Box, axis: int) -> tuple[Box, Box]:
+    """A box split at 0.5 (lo + hi) across an axis, the lower half first."""
+    low, high = box[axis]
+    middle = 0.5 * (low + high)
+    lower, upper = list(box), list(box)
+    lower[axis], upper[axis] = (low, middle), (middle, high)
+    return (lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2])
+
+
+def proved(statement: Statement, machines: Machines, domain: Domain, box: Box) -> bool:
+    """Whether a statement holds on a box, by halving it where the bounds are too loose."""
+    waiting: list[tuple[Box, int]] = [(box, 0)]
+    while waiting:
+        part, depth = waiting.pop()
+        if settled(statement, machines, domain, part):
+            continue
+        widths = [high - low for low, high in part]
+        if depth == BISECTIONS or not max(widths) > 0.0:
+            return False
+        waiting += [(half, depth + 1) for half in halves(part, widths.index(max(widths)))]
+    return True
+
+
+def never_reached(machines: Machines, box: Box) -> bool:
+    """Whether no pose of a box is in reach, by halving it where the bounds are too loose."""
+    waiting: list[tuple[Box, int]] = [(box, 0)]
+    while waiting:
+        part, depth = waiting.pop()
+        if out_of_reach(machines, part, spans_of(machines, part)):
+            continue
+        widths = [high - low for low, high in part]
+        if depth == BISECTIONS or not max(widths) > 0.0:
+            return False
+        waiting += [(half, depth + 1) for half in halves(part, widths.index(max(widths)))]
+    return True
+
+
+def sum_of_links(machines: Machines, largest: bool) -> arb:
+    """Greatest or least total link length of the machines."""
+    total = arb(0)
+    for size in ("f", "r"):
+        for limb in LIMBS:
+            span = machines.sizes[f"{size}{limb + 1}"]
+            total += span.high if largest else span.low
+    return total
+
+
+def sizes_within(limb: int, nominal: Mapping[str, float], tolerance: Mapping[str, float]) -> dict[str, Span]:
+    """A limb's sizes from its parameters db, dp, f, r, k, each ± its tolerance, exactly enclosed."""
+    ends = {
+        name: (arb(value) - arb(tolerance[name]), arb(value) + arb(tolerance[name]))
+        for name, value in nominal.items()
+    }
+    (base_low, base_high), (platform_low, platform_high) = ends["db"], ends["dp"]
+    found = {f"{name}{limb + 1}": Span(*ends[name]) for name in ("f", "r", "k")}
+    return found | {f"delta{limb + 1}": Span(platform_low - base_high, platform_high - base_low)}

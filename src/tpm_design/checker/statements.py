@@ -1,0 +1,306 @@
+"""What a certificate states, as inequalities between quantities of a configuration.
+
+A statement holds on a box where each of its goals is > 0 on all of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+from flint import arb
+
+from tpm_design.checker.balls import (
+    POSITIVE_DEFINITE,
+    Enclosure,
+    Symmetric,
+    constant,
+    cross,
+    determinant,
+    dot,
+    norm_squared,
+    square,
+)
+from tpm_design.checker.spectrum import singular_pairs
+from tpm_design.checker.uru import LIMBS, Configuration, Velocity
+
+Goal = Callable[[Configuration], Enclosure]
+DETERMINANTS = ("translation", "actuation", "rotation")
+NINE = arb(9)
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Every leg margin ≥ floor (m), on the octant's side of each plane, joints within their ranges."""
+
+    floor: float
+
+    def goals(self, configuration: Configuration) -> list[Goal]:
+        margin = constant(arb(self.floor))
+        legs: list[Goal] = [
+            lambda at, limb=limb, side=side: at.leg_margins(limb)[side] - margin  # type: ignore[misc]
+            for limb in LIMBS
+            for side in (0, 1)
+        ]
+        return legs + limit_goals(configuration)
+
+
+def limit_goals(configuration: Configuration) -> list[Goal]:
+    """Joints within their ranges."""
+    return [
+        lambda at, limb=limb, limit=limit: at.limit_margin(limb, limit)  # type: ignore[misc]
+        for limb in LIMBS
+        for limit in configuration.limits
+    ]
+
+
+def outside_goals(configuration: Configuration) -> list[Goal]:
+    """Each of them > 0 alone puts a pose out of reach."""
+    legs: list[Goal] = [
+        lambda at, limb=limb, side=side: -at.leg_margins(limb)[side]  # type: ignore[misc]
+        for limb in LIMBS
+        for side in (0, 1)
+    ]
+    limits: list[Goal] = [
+        lambda at, limb=limb, limit=limit: -at.limit_margin(limb, limit)  # type: ignore[misc]
+        for limb in LIMBS
+        for limit in configuration.limits
+    ]
+    return legs + limits
+
+
+@dataclass(frozen=True)
+class Determinant:
+    """sign · (determinant of unit rows) ≥ floor."""
+
+    name: str
+    sign: int
+    floor: float
+
+    def goals(self, _: Configuration) -> list[Goal]:
+        sign, floor = arb(self.sign), constant(arb(self.floor))
+        return [lambda at: at.unit_determinant(self.name).times(sign) - floor]
+
+
+@dataclass(frozen=True)
+class Serial:
+    """|sin θ_i3| ≥ floor for each limb."""
+
+    floor: float
+
+    def goals(self, _: Configuration) -> list[Goal]:
+        least = constant(arb(self.floor) ** 2)
+        return [
+            lambda at, limb=limb: at.elbow_sine_squared(limb) - least  # type: ignore[misc]
+            for limb in LIMBS
+        ]
+
+
+@dataclass(frozen=True)
+class Frobenius:
+    """1/κ_F = 3/(‖J‖_F ‖J⁻¹‖_F) ≥ floor, as 9 det(A)² ≥ floor² ‖adj(A) B‖² ‖B⁻¹ A‖²."""
+
+    drive: str
+    floor: float
+
+    def goals(self, _: Configuration) -> list[Goal]:
+        least = arb(self.floor) ** 2
+
+        def goal(at: Configuration) -> Enclosure:
+            rows, lengths, b = at.velocity(self.drive)
+            pairs = (cross(rows[1], rows[2]), cross(rows[2], rows[0]), cross(rows[0], rows[1]))
+            squares = [square(entry) for entry in b]
+            forward = dot(squares, [norm_squared(pair) for pair in pairs])
+            first, second, third = (length / b2 for length, b2 in zip(lengths, squares, strict=True))
+            backward = first + second + third
+            return square(determinant(rows)).times(NINE) - (forward * backward).times(least)
+
+        return [goal]
+
+
+def gram(velocity: Velocity) -> Symmetric:
+    """A Aᵀ."""
+    first, second, third = velocity.rows
+    return Symmetric(velocity.squares, (dot(second, third), dot(third, first), dot(first, second)))
+
+
+def squared_less_gram(velocity: Velocity, scale: Enclosure) -> Symmetric:
+    """B² − scale · A Aᵀ."""
+    (p, q, r), (u, v, w) = gram(velocity)
+    b1, b2, b3 = (square(entry) for entry in velocity.b)
+    return Symmetric(
+        (b1 - scale * p, b2 - scale * q, b3 - scale * r), (-(scale * u), -(scale * v), -(scale * w))
+    )
+
+
+def negative(matrix: Symmetric) -> Symmetric:
+    (p, q, r), (u, v, w) = matrix
+    return Symmetric((-p, -q, -r), (-u, -v, -w))
+
+
+def positive_definite(matrix: Callable[[Configuration], Symmetric]) -> list[Goal]:
+    known = lru_cache(maxsize=2)(matrix)  # one configuration is asked for all three coefficients
+    return [
+        lambda at, coefficient=coefficient: coefficient(known(at))  # type: ignore[misc]
+        for coefficient in POSITIVE_DEFINITE
+    ]
+
+
+@dataclass(frozen=True)
+class Slowest:
+    """σ_min(J) ≥ floor, as B² − floor² A Aᵀ ≻ 0."""
+
+    drive: str
+    floor: float
+
+    def goals(self, _: Configuration) -> list[Goal]:
+        scale = constant(arb(self.floor) ** 2)
+        return positive_definite(lambda at: squared_less_gram(at.velocity(self.drive), scale))
+
+
+@dataclass(frozen=True)
+class Fastest:
+    """σ_max(J) ≤ ceiling, as ceiling² A Aᵀ − B² ≻ 0."""
+
+    drive: str
+    ceiling: float
+
+    def goals(self, _: Configuration) -> list[Goal]:
+        scale = constant(arb(self.ceiling) ** 2)
+        return positive_definite(lambda at: negative(squared_less_gram(at.velocity(self.drive), scale)))
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A linear function of the variables: ``middle`` at ``centre``."""
+
+    middle: arb
+    centre: Mapping[str, arb]
+    slope: Mapping[str, arb]
+
+    def at(self, configuration: Configuration) -> Enclosure:
+        value = constant(self.middle)
+        for name, slope in self.slope.items():
+            value = value + (configuration.variables[name] - constant(self.centre[name])).times(slope)
+        return value
+
+
+@dataclass(frozen=True)
+class Condition:
+    """1/κ₂ ≥ floor: some scale t has t floor² A Aᵀ ≺ B² ≺ t A Aᵀ at each pose.
+
+    σ_max(J)² ≤ t ≤ σ_min(J)²/floor². A scale that follows their geometric mean over the box leaves both
+    inequalities the same room; it is chosen in plain numbers, and any choice that serves is a proof.
+    """
+
+    drive: str
+    floor: float
+
+    def goals(self, configuration: Configuration) -> list[Goal]:
+        scale = self.scale(configuration)
+        if scale is None:
+            return [lambda _: constant(arb(-1))]
+        least = arb(self.floor) ** 2
+        below = positive_definite(
+            lambda at: squared_less_gram(at.velocity(self.drive), scale.at(at).times(least))
+        )
+        above = positive_definite(
+            lambda at: negative(squared_less_gram(at.velocity(self.drive), scale.at(at)))
+        )
+        return above + below
+
+    def scale(self, configuration: Configuration) -> Scale | None:
+        """With slopes where the configuration has them; None at a singularity, where there is no scale."""
+        rows, _, b = configuration.velocity(self.drive)
+        middle = [[float(entry.value) for entry in row] for row in rows]
+        driven = [float(entry.value) for entry in b]
+        try:
+            (least, *slow), _, (greatest, *fast) = singular_pairs(middle, driven)
+            # without a floor any scale above the greatest serves
+            mean = math.sqrt(least * greatest) / (self.floor or 0.5 * math.sqrt(least / greatest))
+        except (ZeroDivisionError, ValueError, OverflowError):
+            return None
+        if not (math.isfinite(mean) and mean > 0.0):
+            return None
+        slope: dict[str, float] = {}
+        for value, (u, w) in ((least, slow), (greatest, fast)):
+            share = 0.5 * mean / value
+            for i in LIMBS:
+                moved = -2.0 * share * value * u[i]
+                for entry, toward in zip(rows[i], w, strict=True):
+                    add_slopes(slope, entry, moved * toward)
+                add_slopes(slope, b[i], 2.0 * share * u[i] * u[i] * driven[i])
+        finite = {name: arb(part) for name, part in slope.items() if math.isfinite(part)}
+        centre = {name: configuration.variables[name].value.mid() for name in finite}
+        return Scale(arb(mean), centre, finite)
+
+
+def add_slopes(total: dict[str, float], entry: Enclosure, factor: float) -> None:
+    for name, part in entry.slope.items():
+        total[name] = total.get(name, 0.0) + factor * float(part)
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """λ_i = |sin θ_i3| ≥ floor and η_i = |det V|/|v_j × v_k| ≥ floor."""
+
+    floor: float
+
+    def goals(self, configuration: Configuration) -> list[Goal]:
+        least = arb(self.floor) ** 2
+
+        def output(at: Configuration, limb: int) -> Enclosure:
+            rows = at.velocity("joint").rows
+            across = norm_squared(cross(rows[(limb + 1) % 3], rows[(limb + 2) % 3]))
+            return square(determinant(rows)) - across.times(least)
+
+        outputs: list[Goal] = [lambda at, limb=limb: output(at, limb) for limb in LIMBS]  # type: ignore[misc]
+        return Serial(self.floor).goals(configuration) + outputs
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """σ_max(A⁻¹ diag(c)) ≤ ceiling with c_i the norm of the coefficients of limb i's length errors."""
+
+    drive: str
+    ceiling: float
+
+    def goals(self, _: Configuration) -> list[Goal]:
+        scale = arb(self.ceiling) ** 2
+
+        def matrix(at: Configuration) -> Symmetric:
+            (p, q, r), (u, v, w) = gram(at.velocity(self.drive))
+            c1, c2, c3 = (at.length_error_gain_squared(limb) for limb in LIMBS)
+            return Symmetric(
+                (p.times(scale) - c1, q.times(scale) - c2, r.times(scale) - c3),
+                (u.times(scale), v.times(scale), w.times(scale)),
+            )
+
+        return positive_definite(matrix)
+
+
+@dataclass(frozen=True)
+class Locus:
+    """No pose within ``distance`` (m) of the region that is in closed reach has this determinant = 0."""
+
+    name: str
+    distance: float
+
+    def goals(self, configuration: Configuration) -> list[Goal]:
+        # on a box the determinant keeps the sign it has in the middle, or is not proved to be away from 0
+        middle = arb(1) if float(configuration.unit_determinant(self.name).value) >= 0.0 else arb(-1)
+        return [lambda at: at.unit_determinant(self.name).times(middle)]
+
+
+@dataclass(frozen=True)
+class Length:
+    """Total link length Σ f_i + r_i between ``floor`` and ``ceiling`` (m), where given."""
+
+    floor: float | None
+    ceiling: float | None
+
+
+Floored = Serial | Frobenius | Condition | Slowest | Transmission
+Statement = Reach | Determinant | Floored | Fastest | Sensitivity | Locus
