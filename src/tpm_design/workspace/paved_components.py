@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from tpm_design.arithmetic import inner, kernel
+from tpm_design.workspace.box_verdicts import EVERY_CORNER
 from tpm_design.workspace.paving import Paving
 
 # pairs of boxes on the way down two trees: every step replaces one by two
@@ -105,7 +106,9 @@ def _meet(tree, traits, inside, parents, pairs, limits, point, face, other):  # 
         else:
             if (closed[a] >> (2 * axis + side) | closed[b] >> (2 * axis2 + side2)) & 1 == 0:
                 _join(upper, a, b)
-            if inside[a, 0] > 0.0 and inside[b, 0] > 0.0:
+            if corners[a] & corners[b] == EVERY_CORNER:
+                _join(lower, a, b)
+            elif corners[a] > 0 and corners[b] > 0:
                 for corner in range(4):
                     for k in range(2):
                         near, far = max(box[k, 0], box2[k, 0]), min(box[k, 1], box2[k, 1])
