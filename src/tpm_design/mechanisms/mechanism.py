@@ -39,6 +39,10 @@ class Mechanism(ABC):
     def mode_of(self, signs: Mapping[str, str]) -> Mode:
         """The working mode named by sign strings, e.g. ``{"octant": "+++", "elbows": "+-+"}``."""
 
+    def single_octants(self, mode: Mode) -> tuple[Mode, ...]:
+        """Modes that make up ``mode`` between planes that no aspect crosses; itself where there are none."""
+        return (mode,)
+
     @abstractmethod
     def reach_radius(self) -> float:
         """Every reachable pose lies within this distance (m) of the origin."""

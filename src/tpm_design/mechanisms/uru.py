@@ -526,6 +526,13 @@ class Uru(Mechanism):
         label = " ".join(signs[field.name] for field in self.kind.mode_fields)
         return Mode(label, UruSigns(octant=values["octant"], elbows=values["elbows"]))
 
+    def single_octants(self, mode: Mode) -> tuple[Mode, ...]:
+        """det H = 0 (17) on the coordinate planes."""
+        sides = [(side,) if side else (1.0, -1.0) for side in mode.signs.octant]
+        return tuple(
+            Mode(mode.label, mode.signs._replace(octant=octant)) for octant in itertools.product(*sides)
+        )
+
     def reach_radius(self) -> float:
         g = self.geometry
         return min(
