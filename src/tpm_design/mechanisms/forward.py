@@ -186,7 +186,7 @@ def _copy(source, target):  # type: ignore[no-untyped-def]
 
 @kernel
 def _branch_and_prune(geometry, motor, q, chart, limits, stack, found, unique, used):  # type: ignore[no-untyped-def]
-    """Boxes in ``limits`` (3, 2) that hold just one zero (``unique``) or may hold singular ones into ``found``.
+    """Boxes in ``limits`` (3, 2) with just one zero (``unique``), or perhaps singular ones, into ``found``.
 
     Returns their number and the number of boxes looked at so far, ``used``; stops where either runs out.
     """
