@@ -52,7 +52,7 @@ def test_a_refuted_requirement_has_its_own_exit_code(tmp_path: Path) -> None:
     assert len(data["requirements"]["conditioning_min"]["pose"]) == 3
     assert data["requirements"]["coverage"] == {
         "outcome": "proved", "reason": "", "unit": "-",
-        "slack": pytest.approx(0.15, abs=0.14),
+        "slack": pytest.approx(0.15, abs=0.15),
     }  # fmt: skip
 
 
