@@ -42,7 +42,7 @@ STARTS = 10
 NEIGHBOURHOODS = (0.02, 0.004)
 """Half widths, as shares of each range, in which a further round polishes: tolerances ask for little."""
 
-MARGIN, MARGIN_GROWTH = 4e-4, 2.0
+MARGIN, MARGIN_GROWTH = 5e-4, 2.0
 """What a requirement must have to spare at its first sample, as a share of its metric's scale, and the factor
 on it each time the same requirement fails again: bounds over boxes are wider than what a search sees."""
 
