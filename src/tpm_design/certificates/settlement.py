@@ -15,12 +15,15 @@ from tpm_design.metrics.context import Context
 from tpm_design.problem import Problem
 from tpm_design.workspace.covers import Cover, Proof, prove
 from tpm_design.workspace.refutation import fails_at, singular_near
-from tpm_design.workspace.region_geometry import signed_distance_at
+from tpm_design.workspace.region_geometry import place, signed_distance_at
+from tpm_design.workspace.regions import Points
 
 Outcome = Literal["proved", "refuted", "undecided"]
 
-# what is tried first is to prove half of the slack that a search has found, so that it can be stated
-SLACK_SHARE = 0.5
+# shares of the slack found by a search that are tried before the bound alone, so that a slack can be stated;
+# a distance that is nearly the true one takes few boxes more
+SLACK_SHARES = (0.5, 0.25, 0.1)
+DISTANCE_SHARES = (0.98, 0.5)
 # a bound of 0 on a determinant asks for a sign: some margin, however small, is needed
 LEAST_MARGIN = 1e-9
 
@@ -76,6 +79,8 @@ def settle(
     proof: Proof | None = None
     used = 0
     for level in _levels(demand, worst, with_slack=with_slack):
+        if level != demand.bound and not _provable_at_worst(demand, level, context, tolerance, worst):
+            continue
         proof = _proof(demand, level, context, tolerance, boxes)
         used += proof.boxes
         if proof.proved:
@@ -95,9 +100,23 @@ def _levels(demand: Demand, worst: Worst, *, with_slack: bool) -> list[float]:
     if demand.kind == "locus" and math.isinf(worst.slack):
         # no locus within reach: any distance would do
         slack = demand.bound
+    shares = DISTANCE_SHARES if demand.kind == "locus" else SLACK_SHARES
     if with_slack and slack > needed:
-        levels.insert(0, demand.bound + demand.sense * SLACK_SHARE * slack)
+        return [*(demand.bound + demand.sense * share * slack for share in shares), *levels]
     return levels
+
+
+def _provable_at_worst(
+    demand: Demand, level: float, context: Context, tolerance: Mapping[str, float], worst: Worst
+) -> bool:
+    """Whether the level is proved at the worst pose alone: where it is not, the region need not be tried."""
+    if demand.kind == "locus" or worst.pose is None:
+        return True
+    region = place(Points((worst.pose,)), (0.0, 0.0, 0.0))
+    statement = demand.statement(level, context.mechanism.kind)
+    return prove(
+        statement, context.mechanism, context.mode, region, tolerance=tolerance, distance=0.0, boxes=1
+    ).proved
 
 
 def _proof(

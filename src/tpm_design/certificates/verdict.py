@@ -16,7 +16,9 @@ from tpm_design.problem import Design, Goal, Problem, design_context
 @dataclass(frozen=True)
 class Requirement:
     """One constraint of the study. ``settlements``: numbers of what it needs, in ``Verdict.settlements``.
-    ``slack`` (SI): the proved one; None unless proved."""
+    ``slack`` (SI): the proved one; None unless proved. ``worst``: the worst value (SI) that a search found
+    over the region and the machines within tolerance, so that the true one lies between what is proved and
+    it; None where the requirement is not on one value, infinite where there is no locus."""
 
     goal: Goal
     outcome: Outcome
@@ -24,6 +26,7 @@ class Requirement:
     settlements: tuple[int, ...]
     breaking: Breaking | None
     reason: str
+    worst: float | None = None
 
 
 @dataclass(frozen=True)
@@ -114,11 +117,13 @@ def _ranges(context: Context) -> list[tuple[float, float]]:
 def _requirement(goal: Goal, numbers: list[int], settlements: tuple[Settlement, ...]) -> Requirement:
     needed = [settlements[number] for number in numbers]
     outcome = worst_outcome([settlement.outcome for settlement in needed])
+    last = needed[-1]
+    worst = last.demand.bound + last.demand.sense * last.found if last.demand.kind != "determinant" else None
     if outcome == "proved":
-        return Requirement(goal, outcome, _slack(needed), tuple(numbers), None, "")
+        return Requirement(goal, outcome, _slack(needed), tuple(numbers), None, "", worst)
     first = next(settlement for settlement in needed if settlement.outcome == outcome)
     reason = f"{_named(first.demand)}: {first.reason}"
-    return Requirement(goal, outcome, None, tuple(numbers), first.breaking, reason)
+    return Requirement(goal, outcome, None, tuple(numbers), first.breaking, reason, worst)
 
 
 def _slack(needed: list[Settlement]) -> float:

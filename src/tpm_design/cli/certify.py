@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -85,7 +86,7 @@ def _design_rows(study: Study, design: Design) -> list[list[str]]:
 def verdict_text(study: Study, found: Verdict) -> str:
     """A verdict as a table and one sentence, in the study's units."""
     rows = [_requirement_row(study, requirement) for requirement in found.requirements]
-    heads = ["requirement", "asked", "verdict", "proved to spare", "why"]
+    heads = ["requirement", "asked", "verdict", "proved to spare", "worst found", "why"]
     effort = f"{found.boxes} boxes, {found.seconds:.2g} s"
     sentences = {
         "proved": f"Proved {_scope(study, found)} ({effort}).",
@@ -121,7 +122,23 @@ def _requirement_row(study: Study, requirement: Requirement) -> list[str]:
     why = requirement.reason
     if requirement.breaking is not None and requirement.breaking.pose is not None:
         why = f"broken at {lengths_text(requirement.breaking.pose, study.units)}: {why}"
-    return [goal.label, asked(goal, study.units, unit), requirement.outcome, spare, why]
+    return [
+        goal.label,
+        asked(goal, study.units, unit),
+        requirement.outcome,
+        spare,
+        _worst(study, requirement),
+        why,
+    ]
+
+
+def _worst(study: Study, requirement: Requirement) -> str:
+    """The worst value that a search found, at the worst machine within tolerance."""
+    if requirement.worst is None:
+        return ""
+    if not math.isfinite(requirement.worst):
+        return "no locus"
+    return study.units.written(requirement.worst, goal_unit(study.problem, requirement.goal))
 
 
 def verdict_data(study: Study, found: Verdict) -> dict[str, Any]:
@@ -129,10 +146,15 @@ def verdict_data(study: Study, found: Verdict) -> dict[str, Any]:
     requirements = {}
     for requirement in found.requirements:
         unit = goal_unit(study.problem, requirement.goal)
-        data: dict[str, Any] = {"outcome": requirement.outcome, "reason": requirement.reason}
+        data: dict[str, Any] = {
+            "outcome": requirement.outcome,
+            "reason": requirement.reason,
+            "unit": study.units.name(unit),
+        }
         if requirement.slack is not None:
             data["slack"] = study.units.from_si(requirement.slack, unit)
-            data["unit"] = study.units.name(unit)
+        if requirement.worst is not None and math.isfinite(requirement.worst):
+            data["worst_found"] = study.units.from_si(requirement.worst, unit)
         if requirement.breaking is not None and requirement.breaking.pose is not None:
             data["pose"] = [study.units.from_si(value, "m") for value in requirement.breaking.pose]
             data["pose_unit"] = study.units.name("m")
