@@ -174,6 +174,27 @@ def test_joint_limits_exclude_assemblies() -> None:
         assert len(machine.fk(q, mode)) == expected
 
 
+@pytest.mark.parametrize("drive", ["motor", "joint"])
+def test_each_assembly_is_proved_to_be_alone_in_its_box(drive: str) -> None:
+    random = np.random.default_rng(17)
+    for _ in range(8):
+        machine = random_machine(random)
+        pose = random_reachable(machine, 1, random)[0]
+        octant = "".join("+" if value > 0.0 else "-" for value in pose)
+        mode = machine.mode(octant=octant, elbows=random_signs(random))
+        found = machine.assemblies(machine.ik([pose], mode, drive=drive)[0], drive=drive)
+        assert found
+        for assembly in found:
+            assert assembly.unique
+            box = np.array(assembly.box)
+            # polished beyond the box's bounds by rounding at most
+            assert (np.array(assembly.pose) >= box[:, 0] - 1e-12).all()
+            assert (np.array(assembly.pose) <= box[:, 1] + 1e-12).all()
+        for one, other in itertools.combinations(found, 2):
+            apart = np.array(one.box)[:, 0] > np.array(other.box)[:, 1]
+            assert (apart | (np.array(one.box)[:, 1] < np.array(other.box)[:, 0])).any()
+
+
 def test_no_assembly() -> None:
     machine = mechanism("uru", db=0.1, dp=0.4, f=1.0, r=0.5, k=1.0)
     assert machine.fk([0.0, 0.0, 0.0], drive="joint").shape == (0, 3)
@@ -187,6 +208,31 @@ def test_assemblies_that_do_not_stand_apart() -> None:
     q = machine.ik([np.full(3, 2.0 / math.sqrt(3.0)) * (1.0 - 1e-9)], mode)[0]
     with pytest.raises(ParameterError, match="do not stand apart"):
         machine.fk(q)
+
+
+def test_at_an_actuation_singularity_no_assembly_is_called_unique() -> None:
+    """Two assemblies meet where det W = 0: bisected between poses of opposite signs."""
+    machine = mechanism("uru", db=0.3, dp=0.1, f=0.6, r=0.5, k=1.0)
+    mode = machine.mode_of({"octant": "+++", "elbows": "-++"})
+    poses = np.random.default_rng(4).uniform(0.05, 1.1, (4000, 3))
+    margins = machine.margins(poses, mode)
+    inside = margins["reach"] > 0.02
+    low = poses[inside & (margins["actuation"] > 0.05)][0]
+    high = poses[inside & (margins["actuation"] < -0.05)][0]
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        positive = machine.margins([middle], mode)["actuation"][0] > 0.0
+        low, high = (middle, high) if positive else (low, middle)
+    q = machine.ik([low], mode)[0]
+    assert np.isfinite(q).all()
+    try:
+        found = machine.assemblies(q)
+    except ParameterError as error:
+        assert "do not stand apart" in error.what
+    else:
+        near = [a for a in found if np.max(np.abs(np.array(a.pose) - low)) < 1e-5]
+        assert near
+        assert not any(assembly.unique for assembly in near)
 
 
 @pytest.mark.parametrize("q", [[0.1, 0.2], [[0.1, 0.2, 0.3]], [0.1, math.nan, 0.2], "abc", None])
