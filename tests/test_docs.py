@@ -112,7 +112,7 @@ def test_the_python_example_runs() -> None:
 
 def test_the_numbers_shown_are_those_of_the_design_shown() -> None:
     """To the digits of the table; the design itself is given to six."""
-    (shown,) = blocks("text")
+    shown, _ = blocks("text")
     rows = {line.split()[0]: line.split()[1:] for line in shown.splitlines() if line.strip()}
     design = {
         name: float(rows[name][0]) / 1000.0

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from tpm_design.mechanisms import mechanism as mechanism
     from tpm_design.study import Study as Study
     from tpm_design.study import load_study as load_study
+    from tpm_design.workspace.certified_volume import CertifiedVolume as CertifiedVolume
+    from tpm_design.workspace.certified_volume import certified_volume as certified_volume
     from tpm_design.workspace.volume import Volume as Volume
     from tpm_design.workspace.volume import workspace_volume as workspace_volume
 
@@ -19,11 +21,22 @@ _HOMES = {
     "mechanism": "tpm_design.mechanisms",
     "workspace_volume": "tpm_design.workspace.volume",
     "Volume": "tpm_design.workspace.volume",
+    "certified_volume": "tpm_design.workspace.certified_volume",
+    "CertifiedVolume": "tpm_design.workspace.certified_volume",
     "load_study": "tpm_design.study",
     "Study": "tpm_design.study",
 }
 
-__all__ = ["Study", "Volume", "__version__", "load_study", "mechanism", "workspace_volume"]
+__all__ = [
+    "CertifiedVolume",
+    "Study",
+    "Volume",
+    "__version__",
+    "certified_volume",
+    "load_study",
+    "mechanism",
+    "workspace_volume",
+]
 
 
 def __getattr__(name: str) -> Any:

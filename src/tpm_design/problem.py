@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from tpm_design.errors import ParameterError
 from tpm_design.mechanisms.base import Dimension, MechanismKind
+from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.metrics.base import UNDEFINED, Measurement, Metric, Sense
 from tpm_design.metrics.context import Context
-from tpm_design.workspace.region_geometry import place
-from tpm_design.workspace.regions import Shape
+from tpm_design.workspace.region_geometry import PlacedRegion, place
+from tpm_design.workspace.regions import Points, Shape
 
 CENTRE = ("center_x", "center_y", "center_z")
 UNDEFINED_VIOLATION = 1.0
@@ -64,8 +65,21 @@ class Accuracy:
 
 
 @dataclass(frozen=True)
+class Sample:
+    """The constraint ``label`` must also hold, with ``margin`` (its metric's SI unit) to spare, for the
+    machine whose parameters differ from the design's by ``offsets`` (name → one per limb, SI; empty: the
+    exact one), over the whole region and at ``pose`` (m, about the region's centre; None: at none alone)."""
+
+    label: str
+    offsets: Mapping[str, tuple[float, ...]]
+    pose: tuple[float, float, float] | None
+    margin: float
+
+
+@dataclass(frozen=True)
 class Problem:
-    """What a study asks. ``modes``: label → sign strings, ``{"+++ +-+": {"octant": …, "elbows": …}}``."""
+    """What a study asks. ``modes``: label → sign strings, ``{"+++ +-+": {"octant": …, "elbows": …}}``.
+    ``samples``: what every design must hold besides; a design's metrics are those of its exact machine."""
 
     kind: MechanismKind
     fixed: Mapping[str, float | str]
@@ -77,12 +91,14 @@ class Problem:
     constraints: tuple[Goal, ...]
     record: tuple[Goal, ...]
     accuracy: Accuracy = Accuracy()
+    samples: tuple[Sample, ...] = ()
 
 
 @dataclass(frozen=True)
 class Evaluation:
     """One evaluated design, SI units. ``slacks``: constraint label → signed distance to its bound, the
-    least of its ``pieces``: one number, or a fixed number of them, smoother in the design."""
+    least of its ``pieces``: one number, or a fixed number of them, smoother in the design; those of the
+    problem's samples included."""
 
     design: Design
     metrics: Mapping[str, float]
@@ -99,21 +115,24 @@ class Evaluation:
 def evaluate(problem: Problem, design: Design) -> Evaluation:
     """Every objective, constraint and recorded metric of one design.
 
-    A constraint is met only on the unfavourable side of its metric's numeric error. A design that cannot
-    be built or measured gets status "failed" and its reason; nothing is raised.
+    A constraint is met only on the unfavourable side of its metric's numeric error, and where the problem's
+    samples meet it too. A design that cannot be built or measured gets status "failed" and its reason;
+    nothing is raised.
     """
     began = time.perf_counter()
     goals = (*problem.objectives, *problem.constraints, *problem.record)
     try:
         context = design_context(problem, design)
         measurements = {goal.label: _measure(context, goal) for goal in goals}
+        sampled = _sampled(problem, context, measurements)
     except (ParameterError, ArithmeticError) as error:
         reason = error.what if isinstance(error, ParameterError) else str(error)
         return Evaluation(
             dict(design), {}, {}, {}, {}, {}, math.inf, "failed", reason, time.perf_counter() - began
         )
     undefined = {label: m.notes[UNDEFINED] for label, m in measurements.items() if UNDEFINED in m.notes}
-    pieces = {goal.label: slack_pieces(goal, measurements[goal.label]) for goal in problem.constraints}
+    own = {goal.label: slack_pieces(goal, measurements[goal.label]) for goal in problem.constraints}
+    pieces = {label: values + sampled.pieces.get(label, ()) for label, values in own.items()}
     slacks = {label: min(values) for label, values in pieces.items()}
     short = {goal.label: max(0.0, -slacks[goal.label]) / goal.metric.scale for goal in problem.constraints}
     for goal in problem.objectives:
@@ -136,7 +155,10 @@ def evaluate(problem: Problem, design: Design) -> Evaluation:
         violation=violation,
         status="infeasible" if missed else "feasible",
         reason="; ".join(
-            f"{label}: {undefined[label]}" if label in undefined else f"{label} missed" for label in missed
+            f"{label}: {undefined[label]}"
+            if label in undefined
+            else f"{label} missed{sampled.why(label) if min(own[label]) >= 0.0 else ''}"
+            for label in missed
         ),
         seconds=time.perf_counter() - began,
     )
@@ -153,6 +175,72 @@ def design_context(problem: Problem, design: Design) -> Context:
         centre = (float(design[CENTRE[0]]), float(design[CENTRE[1]]), float(design[CENTRE[2]]))
         region = place(problem.region, centre)
     return Context(mechanism, mode, region, problem.accuracy.volume, problem.accuracy.region_samples)
+
+
+@dataclass(frozen=True)
+class _Sampled:
+    """``pieces``: slacks of the samples by constraint, less their margins; ``reasons``: why one is missed."""
+
+    pieces: Mapping[str, tuple[float, ...]]
+    reasons: Mapping[str, str]
+
+    def why(self, label: str) -> str:
+        return f" {self.reasons[label]}" if label in self.reasons else ""
+
+
+def _sampled(problem: Problem, context: Context, nominal: Mapping[str, Measurement]) -> _Sampled:
+    goals = {goal.label: goal for goal in problem.constraints}
+    # samples of the same machine share what their metrics need
+    contexts: dict[tuple[tuple[str, tuple[float, ...]], ...], Context | str] = {(): context}
+    pieces: dict[str, tuple[float, ...]] = {}
+    reasons: dict[str, str] = {}
+    for sample in problem.samples:
+        goal, machine = goals[sample.label], tuple(sorted(sample.offsets.items()))
+        if machine not in contexts:
+            contexts[machine] = _offset_context(problem, context, sample.offsets)
+        of_machine = contexts[machine]
+        if isinstance(of_machine, str):
+            found: tuple[float, ...] = (-UNDEFINED_VIOLATION * goal.metric.scale,)
+            why = f"within the tolerances: {of_machine}"
+        else:
+            over = nominal[sample.label] if not machine else _measure(of_machine, goal)
+            values = slack_pieces(goal, over)
+            if sample.pose is not None:
+                at_pose = replace(of_machine, region=_pose_region(of_machine, sample.pose))
+                values = (*values, min(slack_pieces(goal, _measure(at_pose, goal))))
+            found = tuple(value - sample.margin for value in values)
+            why = "within the tolerances" if machine else "by the margin that its proof needs"
+        pieces[sample.label] = pieces.get(sample.label, ()) + found
+        if min(found) < 0.0:
+            reasons.setdefault(sample.label, why)
+    return _Sampled(pieces, reasons)
+
+
+def _offset_context(
+    problem: Problem, context: Context, offsets: Mapping[str, tuple[float, ...]]
+) -> Context | str:
+    """The same place with another machine, or why there is none."""
+    try:
+        return replace(context, mechanism=offset_mechanism(problem, context.mechanism, offsets))
+    except ParameterError as error:
+        return error.what
+
+
+def offset_mechanism(
+    problem: Problem, nominal: Mechanism, offsets: Mapping[str, tuple[float, ...]]
+) -> Mechanism:
+    """The machine whose limbs differ from ``nominal`` by ``offsets`` (name → one per limb, SI). Raises
+    ParameterError where there is no such machine."""
+    values = {
+        name: tuple(v + o for v, o in zip(per_limb, offsets.get(name, (0.0,) * len(per_limb)), strict=True))
+        for name, per_limb in nominal.parameters.items()
+    }
+    return problem.kind.build(values, problem.limits)
+
+
+def _pose_region(context: Context, pose: tuple[float, float, float]) -> PlacedRegion:
+    """One pose of the context's region, given about its centre."""
+    return place(Points((pose,)), context.placed.centre)
 
 
 def slack_pieces(goal: Goal, measurement: Measurement) -> tuple[float, ...]:

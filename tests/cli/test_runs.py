@@ -73,6 +73,7 @@ def test_the_table_has_units_and_every_evaluation_in_order(finished: tuple[Outco
     rows = rows_of(finished[1] / "evaluations.csv")
     assert list(rows[0]) == [
         "id",
+        "round",
         "status",
         "reason",
         "db [mm]",

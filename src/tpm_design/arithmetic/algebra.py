@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tpm_design.arithmetic.compilation import FAST, STRICT, is_number
-from tpm_design.arithmetic.dual import Dual, componentwise, is_dual
+from tpm_design.arithmetic.dual import Dual, componentwise, is_constant, is_dual
 
 # isort: split
 from numba.extending import overload
@@ -65,7 +65,9 @@ def _for_others(
     entries = (a11, a12, a13, a21, a22, a23, a31, a32, a33)
     if all(map(is_number, entries)):
         return None
-    return _determinant_of_duals if all(map(is_dual, entries)) else _expanded
+    if all(map(is_dual, entries)):
+        return _determinant_of_duals
+    return _expanded if all(is_dual(kind) or is_constant(kind) for kind in entries) else None
 
 
 overload(determinant, jit_options=FAST, strict=False)(_for_floats)

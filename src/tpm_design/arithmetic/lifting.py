@@ -32,6 +32,20 @@ def _overload_lifted(x: Any, like: Any) -> Any:
     return _to_kind if not is_dual(x) or is_interval(like) else None
 
 
+def constant(x: Any, like: Any) -> Any:
+    """A number as an Interval of no width where ``like`` is an Interval or a Dual of Intervals."""
+    return same_kind(x, like.value) if isinstance(like, Dual) else same_kind(x, like)
+
+
+def _beside_dual(x: Any, like: Any) -> Any:
+    return same_kind(x, like.value)
+
+
+@overload(constant, jit_options=STRICT, strict=False)
+def _overload_constant(x: Any, like: Any) -> Any:
+    return _beside_dual if is_dual(like) else _to_kind
+
+
 def seeded(values: Any, like: Any) -> Any:
     """``variables(values)`` with as many derivatives as the Dual ``like`` has, the last ones 0."""
     raise NotImplementedError

@@ -11,7 +11,7 @@ from tpm_design.errors import ParameterError
 from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.metrics.context import Context
-from tpm_design.problem import Problem
+from tpm_design.problem import Problem, offset_mechanism
 from tpm_design.workspace.indices import REACH, Index, index_values
 
 Parameters = Mapping[str, tuple[float, ...]]
@@ -32,12 +32,8 @@ class Worst:
 def perturbed(problem: Problem, nominal: Mechanism, offsets: Parameters) -> Mechanism | None:
     """The machine whose limbs differ from ``nominal`` by ``offsets`` (name → one per limb, SI); None where
     there is no such machine."""
-    values = {
-        name: tuple(v + o for v, o in zip(per_limb, offsets.get(name, (0.0,) * len(per_limb)), strict=True))
-        for name, per_limb in nominal.parameters.items()
-    }
     try:
-        return problem.kind.build(values, problem.limits)
+        return offset_mechanism(problem, nominal, offsets)
     except ParameterError:
         return None
 

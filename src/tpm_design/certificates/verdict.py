@@ -16,7 +16,7 @@ from tpm_design.problem import Design, Goal, Problem, design_context
 @dataclass(frozen=True)
 class Requirement:
     """One constraint of the study. ``settlements``: numbers of what it needs, in ``Verdict.settlements``.
-    ``slack`` (SI): the proved one, of the demand that carries the bound; None unless proved."""
+    ``slack`` (SI): the proved one; None unless proved."""
 
     goal: Goal
     outcome: Outcome
@@ -117,7 +117,7 @@ def _requirement(goal: Goal, numbers: list[int], settlements: tuple[Settlement, 
     needed = [settlements[number] for number in numbers]
     outcome = worst_outcome([settlement.outcome for settlement in needed])
     if outcome == "proved":
-        return Requirement(goal, outcome, needed[-1].slack, tuple(numbers), None, "")
+        return Requirement(goal, outcome, _slack(needed), tuple(numbers), None, "")
     first = next(settlement for settlement in needed if settlement.outcome == outcome)
     reason = f"{_named(first.demand)}: {first.reason}"
     if outcome == "refuted" and goal.metric.name == "coverage" and (goal.minimum or 0.0) < 1.0:
@@ -125,6 +125,15 @@ def _requirement(goal: Goal, numbers: list[int], settlements: tuple[Settlement, 
             goal, "undecided", None, tuple(numbers), None, f"{reason}, which says nothing of a share below 1"
         )
     return Requirement(goal, outcome, None, tuple(numbers), first.breaking, reason)
+
+
+def _slack(needed: list[Settlement]) -> float:
+    """The slack of the demand that carries the bound, the last one; of several dimensionless margins the
+    least."""
+    margins = ("determinant", "serial")
+    if needed[-1].demand.kind not in margins:
+        return needed[-1].slack
+    return min(settlement.slack for settlement in needed if settlement.demand.kind in margins)
 
 
 def _named(demand: Demand) -> str:

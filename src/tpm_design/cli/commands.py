@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tpm_design.cli.guard import INTERRUPTED, NOTHING_FEASIBLE
+from tpm_design.cli.guard import INTERRUPTED, NOT_PROVED, NOTHING_FEASIBLE
 from tpm_design.cli.progress import search_progress
 from tpm_design.cli.results import design_rows, evaluation_data, limit_text, result_text
 from tpm_design.cli.text import table
@@ -206,6 +206,8 @@ def optimize_one(
         raise UsageError(
             f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
         )
+    from tpm_design.cli.certify import verdict_data, verdict_text
+
     study = load_study(path).searched_with(seed=seed, budget=budget)
     check_plan(study.problem, plan_of(study))
     # short compiled calls by several threads: the usual 5 ms would make them wait for one another
@@ -217,17 +219,23 @@ def optimize_one(
         data: dict[str, Any] = {"study": study.name, "run": str(run.folder), "status": run.status}
         if run.best is not None:
             data["best"] = evaluation_data(study.problem, study.units, run.best)
+        if run.verdict is not None:
+            data["verdict"] = verdict_data(study, run.verdict)
         print(json.dumps(data, ensure_ascii=False))
     else:
         if run.best is not None and run.result.best is not None:
             print(result_text(study.problem, study.units, run.best))
             print("\n" + limit_text(study.problem, run.result.best))
+        if run.verdict is not None:
+            print("\n" + verdict_text(study, run.verdict) + "\n")
         print(run.status)
         for remark in run.result.remarks:
             print(remark)
         print(f"Run: {run.folder}\nNext: tpm-design report {run.folder}")
     if run.result.ending == "interrupted":
         return INTERRUPTED
+    if run.verdict is not None and run.verdict.outcome != "proved":
+        return NOT_PROVED
     return None if feasible else NOTHING_FEASIBLE
 
 

@@ -38,18 +38,22 @@ class _Best:
         self._goal = problem.objectives[0]
         self._feasible = float("inf")
         self._violation = float("inf")
+        self._round = 1
 
     def update(self, entry: Entry) -> str:
+        if entry.round > self._round:
+            # earlier designs were judged by fewer samples
+            self._round, self._feasible, self._violation = entry.round, float("inf"), float("inf")
         if entry.evaluation.status == "feasible":
             self._feasible = min(self._feasible, minimised(self._problem, entry.evaluation))
         self._violation = min(self._violation, entry.evaluation.violation)
+        before = f"round {self._round}: " if self._round > 1 else ""
         if self._feasible < float("inf"):
             sign = 1.0 if self._goal.sense == "minimize" else -1.0
             value = sign * self._feasible * self._goal.metric.scale
-            return (
-                f"best {self._goal.label} {self._units.written(value, goal_unit(self._problem, self._goal))}"
-            )
-        return f"none feasible yet, least violation {self._violation:.3g}"
+            written = self._units.written(value, goal_unit(self._problem, self._goal))
+            return f"{before}best {self._goal.label} {written}"
+        return f"{before}none feasible yet, least violation {self._violation:.3g}"
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from tpm_design.arithmetic import Interval, inner, kernel, variables
 from tpm_design.errors import ParameterError
 from tpm_design.mechanisms import equations, pointwise
+from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.mechanism import FloatArray, Mechanism
 from tpm_design.mechanisms.velocity import adjugate_columns
 
@@ -183,8 +185,8 @@ def _copy(source, target):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _branch_and_prune(geometry, motor, q, chart, limits, stack, found, used):  # type: ignore[no-untyped-def]
-    """Centres of boxes in ``limits`` (3, 2) that hold one zero or may hold a singular one, into ``found``.
+def _branch_and_prune(geometry, motor, q, chart, limits, stack, found, unique, used):  # type: ignore[no-untyped-def]
+    """Boxes in ``limits`` (3, 2) with just one zero (``unique``), or perhaps singular ones, into ``found``.
 
     Returns their number and the number of boxes looked at so far, ``used``; stops where either runs out.
     """
@@ -205,8 +207,8 @@ def _branch_and_prune(geometry, motor, q, chart, limits, stack, found, used):  #
             narrowing = CELL < after < 0.6 * before
         k, share = _widest(box, limits)
         if state == 1 or (state == 0 and share <= CELL):
-            for j in range(3):
-                found[count, j] = 0.5 * (wide[j, 0] + wide[j, 1])
+            _copy(wide, found[count])
+            unique[count] = state == 1
             count += 1
         elif state == 0:
             middle = 0.5 * (box[k, 0] + box[k, 1])
@@ -218,70 +220,96 @@ def _branch_and_prune(geometry, motor, q, chart, limits, stack, found, used):  #
     return count, used
 
 
+@dataclass(frozen=True)
+class Candidates:
+    """Where ``equations.closure`` may vanish in one chart: coordinates (K, 3), polished, the boxes (K, 3, 2)
+    they were found in, and whether each box is proved to hold just one zero (K,)."""
+
+    chart: Chart
+    coordinates: FloatArray
+    boxes: FloatArray
+    unique: NDArray[np.bool_]
+
+
 def candidates(
     geometry: Any,
     motor: float,
     q: tuple[float, float, float],
     charts: Sequence[tuple[Chart, NDArray[np.float64]]],
-) -> list[tuple[Chart, NDArray[np.float64]]]:
-    """Where ``equations.closure`` vanishes in the ``charts``, each with the limits (3, 2) of its coordinates:
-    the same charts with the coordinates (K, 3) found, polished.
+) -> list[Candidates]:
+    """Every zero of ``equations.closure`` in the ``charts``, each with the limits (3, 2) of its coordinates.
 
-    Raises ParameterError where assemblies do not stand apart: a curve of them, or a cluster at a singularity.
+    Raises ParameterError where zeros do not stand apart: a curve of them, or a cluster at a singularity.
     """
     stack = np.empty((STACK, 3, 2))
-    found = np.empty((CANDIDATE_LIMIT, 3))
+    found = np.empty((CANDIDATE_LIMIT, 3, 2))
+    unique = np.empty(CANDIDATE_LIMIT, dtype=np.bool_)
     used = 0
     result = []
     for chart, limits in charts:
-        count, used = _branch_and_prune(geometry, motor, q, chart, limits, stack, found, used)
+        count, used = _branch_and_prune(geometry, motor, q, chart, limits, stack, found, unique, used)
         if used >= BOX_LIMIT or count >= CANDIDATE_LIMIT:
-            raise _not_apart(q)
-        coordinates = found[:count].copy()
+            raise _not_apart(q, "A singularity or a continuum of poses is there")
+        boxes = found[:count].copy()
+        coordinates = boxes.mean(axis=2)
         _polish(geometry, motor, q, chart, coordinates)
-        result.append((chart, coordinates))
+        result.append(Candidates(chart, coordinates, boxes, unique[:count].copy()))
     return result
 
 
-def assemblies(
-    mechanism: Mechanism, poses: FloatArray, modes: Iterable[Any], q: FloatArray, motor: float, turn: float
-) -> FloatArray:
-    """The poses (K, 3), each once, that have the actuator coordinates ``q`` (3,) in one of the ``modes``
+def confirmed(
+    mechanism: Mechanism,
+    found: Sequence[Assembly],
+    modes: Iterable[Any],
+    q: FloatArray,
+    motor: float,
+    turn: float,
+) -> tuple[Assembly, ...]:
+    """Those of ``found``, each once, that have the actuator coordinates ``q`` (3,) in one of the ``modes``
     (their signs) by the inverse map, within the limits of legs and joints. ``turn``: differences of q by
     multiples of it count as none; 0 if there is no such period.
 
     Raises ParameterError where two are nearer than can be told apart.
     """
     radius = mechanism.reach_radius()
-    poses = _distinct(poses, SAME * radius)
-    x, y, z = pointwise.columns(poses)
+    # of two that are the same, the one that is proved to be unique
+    distinct = _distinct(sorted(found, key=lambda assembly: not assembly.unique), SAME * radius)
+    x, y, z = pointwise.columns(np.array([assembly.pose for assembly in distinct]))
     valid = np.zeros(x.size, dtype=np.bool_)
-    found, legs, side = np.empty((x.size, 3)), np.empty(x.size), np.empty(x.size)
+    actuators, legs, side = np.empty((x.size, 3)), np.empty(x.size), np.empty(x.size)
     for signs in modes:
-        pointwise.actuators_row(mechanism.geometry, signs, motor, x, y, z, found)
+        pointwise.actuators_row(mechanism.geometry, signs, motor, x, y, z, actuators)
         pointwise.reach_row(mechanism.geometry, signs, x, y, z, legs, side)
-        difference = found - q
+        difference = actuators - q
         if turn > 0.0:
             difference -= turn * np.round(difference / turn)
         agrees = (np.abs(difference) <= AGREEMENT * np.maximum(1.0, np.abs(q))).all(axis=1)
         valid |= agrees & (legs >= -SAME * radius) & (side >= -SAME * radius)
-    if len(_distinct(poses[valid], APART * radius)) < valid.sum():
-        raise _not_apart(q)
-    return poses[valid]
+    kept = [assembly for assembly, holds in zip(distinct, valid, strict=True) if holds]
+    apart = _distinct(kept, APART * radius)
+    if len(apart) < len(kept):
+        crowded = next(assembly for assembly in kept if assembly not in apart)
+        raise _not_apart(q, f"Several may lie in the box {_box_text(crowded)}")
+    return tuple(sorted(kept, key=lambda assembly: assembly.pose))
 
 
-def _distinct(poses: FloatArray, apart: float) -> FloatArray:
-    """The finite poses, one of each cluster closer than ``apart``."""
-    kept: list[FloatArray] = []
-    for pose in poses[np.isfinite(poses).all(axis=1)]:
-        if all(np.max(np.abs(pose - other)) > apart for other in kept):
-            kept.append(pose)
-    return np.array(kept).reshape(-1, 3)
+def _distinct(found: Iterable[Assembly], apart: float) -> list[Assembly]:
+    """The finite assemblies, the first of each cluster closer than ``apart``."""
+    kept: list[Assembly] = []
+    for assembly in found:
+        pose = np.array(assembly.pose)
+        if np.isfinite(pose).all() and all(np.max(np.abs(pose - other.pose)) > apart for other in kept):
+            kept.append(assembly)
+    return kept
 
 
-def _not_apart(q: Sequence[float] | FloatArray) -> ParameterError:
+def _box_text(assembly: Assembly) -> str:
+    return " × ".join(f"[{low:.9g}, {high:.9g}]" for low, high in assembly.box) + " m"
+
+
+def _not_apart(q: Sequence[float] | FloatArray, where: str) -> ParameterError:
     shown = ", ".join(f"{value:g}" for value in q)
     return ParameterError(
-        f"The assemblies for q = ({shown}) do not stand apart.",
-        remedy="A singularity or a continuum of poses is there: give actuator coordinates beside it.",
+        f"The assemblies for q = ({shown}) do not stand apart. {where}.",
+        remedy="Give actuator coordinates beside the singularity.",
     )

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from tpm_design.arithmetic import Interval
 from tpm_design.errors import ParameterError, did_you_mean
 from tpm_design.mechanisms import pointwise
+from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import MechanismKind
 
 FloatArray = NDArray[np.float64]
@@ -38,6 +39,10 @@ class Mechanism(ABC):
     def mode_of(self, signs: Mapping[str, str]) -> Mode:
         """The working mode named by sign strings, e.g. ``{"octant": "+++", "elbows": "+-+"}``."""
 
+    def single_octants(self, mode: Mode) -> tuple[Mode, ...]:
+        """Modes that make up ``mode`` between planes that no aspect crosses; itself where there are none."""
+        return (mode,)
+
     @abstractmethod
     def reach_radius(self) -> float:
         """Every reachable pose lies within this distance (m) of the origin."""
@@ -56,9 +61,21 @@ class Mechanism(ABC):
         """Bounds (m) of ``total_link_length`` for every machine within ``tolerance``."""
 
     @abstractmethod
+    def assemblies(
+        self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor"
+    ) -> tuple[Assembly, ...]:
+        """Every real assembly for actuator coordinates ``q`` (3,), as ``fk`` gives them, each with a box that
+        is proved to hold it alone, or with the box where that proof fails."""
+
     def fk(self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor") -> FloatArray:
         """Every real assembly (K, 3) in metres for actuator coordinates ``q`` (3,), of all working modes
-        or of ``mode``, each confirmed by the inverse map; ``drive`` as in ``ik``."""
+        or of ``mode``, each confirmed by the inverse map; (0, 3) if there is none. ``drive`` as in ``ik``.
+
+        Raises ParameterError on an unknown ``drive``, on anything but three finite numbers, and where
+        assemblies do not stand apart, at a singularity: its message names the box.
+        """
+        found = self.assemblies(q, mode, drive=drive)
+        return np.array([assembly.pose for assembly in found]).reshape(-1, 3)
 
     def ik(self, points: ArrayLike, mode: Mode, *, drive: str = "motor") -> FloatArray:
         """Actuator coordinates (N, n) at ``points`` (N, 3) in metres; rows of NaN where the pose is

@@ -13,6 +13,7 @@ import math
 from typing import Any
 
 from tpm_design.arithmetic import Dual, Interval, root, sqr
+from tpm_design.arithmetic.affine import is_affine
 from tpm_design.arithmetic.compilation import FAST, STRICT, is_number
 from tpm_design.arithmetic.dual import as_dual, combinations, differences, is_dual, multiples
 from tpm_design.arithmetic.interval import bounded, hull
@@ -25,7 +26,8 @@ from numba.extending import overload, register_jitable
 def distal_link(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
     """(a, c, γ) of links f and r for a point with ρ² = α² + β²; elbow + has γ < 0.
 
-    Out of reach the elbow stays straight. In compiled code, for floats, Intervals and Duals of either.
+    Out of reach the elbow stays straight. In compiled code, for floats, Intervals, Duals of either, and
+    Affine points.
     """
     raise NotImplementedError
 
@@ -132,6 +134,16 @@ def _duals_of_the_lengths(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: An
     return Dual(a, multiples(-c, turn)), Dual(c, multiples(a, turn)), Dual(gamma, gain)
 
 
+def _forms_of_the_point(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
+    both, product, difference, inverse_r = bounds_from_lengths(as_interval(f), as_interval(r))
+    bent = (0.5 * elbow) * root(product - sqr(rho_squared - both))
+    inverse = 1.0 / rho_squared
+    share, turn = 0.5 + difference * inverse, bent * inverse
+    a = (alpha * share + beta * turn) * inverse_r
+    c = (beta * share - alpha * turn) * inverse_r
+    return a, c, -(bent * inverse_r)
+
+
 def _for_floats(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
     return _closed_form if all(map(is_number, (alpha, beta, rho_squared, f, r))) else None
 
@@ -141,6 +153,8 @@ def _for_others(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: 
         return _duals_of_the_lengths
     if is_dual(rho_squared):
         return _duals_of_the_point
+    if is_affine(rho_squared):
+        return _forms_of_the_point
     return None if all(map(is_number, (alpha, beta, rho_squared, f, r))) else _intervals
 
 

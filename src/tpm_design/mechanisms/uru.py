@@ -33,8 +33,9 @@ from tpm_design.arithmetic import (
 )
 from tpm_design.arithmetic.algebra import determinant
 from tpm_design.arithmetic.compilation import STRICT
-from tpm_design.arithmetic.lifting import replaced
+from tpm_design.arithmetic.lifting import constant, replaced
 from tpm_design.mechanisms import equations, forward
+from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.mechanism import FloatArray, Mechanism, Mode
 from tpm_design.mechanisms.parameters import limb_tolerances, limb_values, mode_signs, three_numbers
@@ -329,11 +330,14 @@ def _limb_closure(geometry, limb, motor, q, size, first, d, dj, dk):  # type: ig
     (−π, 2π), where no pose has it."""
     f = geometry.proximal[limb]
     r = geometry.distal[limb]
-    offset = geometry.platform[limb] - geometry.base[limb]
+    centred = geometry.platform[limb] == geometry.base[limb] and f == r
+    # enclosed: a sum of two lengths is rounded
+    f, r = constant(f, size), constant(r, size)
+    offset = constant(geometry.platform[limb], size) - geometry.base[limb]
     across = root(sqr(dj) + sqr(dk))
-    second = (motor * geometry.gear[limb]) * (q - first) + (1.0 - motor) * q
+    second = (motor * constant(geometry.gear[limb], size)) * (q - first) + (1.0 - motor) * q
     excess = magnitude(second - 0.5 * math.pi) - 1.5 * math.pi
-    if offset == 0.0 and f == r:
+    if centred:
         # closed at the origin for every θ_i2: that factor is divided out
         plain = size * (sqr(d) + sqr(across)) - 2.0 * f * (d * cosine(second) + across * sine(second))
         return plain, excess
@@ -471,10 +475,19 @@ def cube_charts(radius: float) -> list[tuple[tuple[float, float], FloatArray]]:
     ]
 
 
-def chart_poses(chart: tuple[float, ...], coordinates: FloatArray) -> FloatArray:
-    """Poses (K, 3) of coordinates (K, 3) in a chart."""
-    size, v, w = coordinates.T
-    return np.column_stack([size * d for d in chart_direction(chart, v, w)])
+def chart_assemblies(found: forward.Candidates) -> list[Assembly]:
+    """The candidates of a chart as poses with boxes."""
+    assemblies = []
+    for (size, v, w), sides, unique in zip(found.coordinates, found.boxes, found.unique, strict=True):
+        pose = [float(size * d) for d in chart_direction(found.chart, v, w)]
+        along, across, last = (Interval(float(low), float(high)) for low, high in sides)
+        box = tuple((side.lo, side.hi) for side in _chart_box(found.chart, along, across, last))
+        assemblies.append(Assembly((pose[0], pose[1], pose[2]), box, bool(unique)))
+    return assemblies
+
+
+def _chart_box(chart: tuple[float, ...], u: Interval, v: Interval, w: Interval) -> list[Interval]:
+    return [u * direction for direction in chart_direction(chart, v, w)]
 
 
 def shaft_possible(angle: float, gear: float) -> bool:
@@ -512,6 +525,13 @@ class Uru(Mechanism):
         values = mode_signs(self.kind, signs)
         label = " ".join(signs[field.name] for field in self.kind.mode_fields)
         return Mode(label, UruSigns(octant=values["octant"], elbows=values["elbows"]))
+
+    def single_octants(self, mode: Mode) -> tuple[Mode, ...]:
+        """det H = 0 (17) on the coordinate planes."""
+        sides = [(side,) if side else (1.0, -1.0) for side in mode.signs.octant]
+        return tuple(
+            Mode(mode.label, mode.signs._replace(octant=octant)) for octant in itertools.product(*sides)
+        )
 
     def reach_radius(self) -> float:
         g = self.geometry
@@ -556,32 +576,35 @@ class Uru(Mechanism):
             total = total + length
         return total
 
-    def fk(self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor") -> FloatArray:
-        """Every real assembly (K, 3) in metres for the actuator coordinates ``q`` (3,) in rad, of all working
-        modes or of ``mode`` alone; (0, 3) if there is none. A complete search: none is missed but those
-        within 1e-12 of a coordinate plane, as a share of the reach.
-
-        Motors: the shaft angles that ``ik`` gives, which count turns. Joints: modulo 2π, the same machine.
-        Raises ParameterError on an unknown ``drive``, on anything but three finite numbers, and where
-        assemblies do not stand apart, at a singularity.
+    def assemblies(
+        self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor"
+    ) -> tuple[Assembly, ...]:
+        """A complete search: no assembly is missed but those within 1e-12 of a coordinate plane, as a share
+        of the reach. Motors: the shaft angles that ``ik`` gives, which count turns. Joints: modulo 2π, the
+        same machine.
         """
         motor = self.motor_weight(drive)
         angles = three_numbers(q, "q", "Give three actuator coordinates in rad.")
         if motor == 0.0:
             angles = np.remainder(angles + math.pi, 2.0 * math.pi) - math.pi
         elif not all(map(shaft_possible, angles, self.geometry.gear)):
-            return np.empty((0, 3))
+            return ()
         radius = self.reach_radius()
         coordinates = (float(angles[0]), float(angles[1]), float(angles[2]))
-        found = forward.candidates(self.geometry, motor, coordinates, cube_charts(radius))
-        poses = np.concatenate([chart_poses(chart, values) for chart, values in found])
         octant = (0.0, 0.0, 0.0) if mode is None else mode.signs.octant
-        off_planes = (np.abs(poses) > NEAREST * radius).all(axis=1)
-        inside = (poses * np.asarray(octant) >= 0.0).all(axis=1)
+        found = [
+            assembly
+            for part in forward.candidates(self.geometry, motor, coordinates, cube_charts(radius))
+            for assembly in chart_assemblies(part)
+            if all(
+                abs(value) > NEAREST * radius and value * side >= 0.0
+                for value, side in zip(assembly.pose, octant, strict=True)
+            )
+        ]
         elbows = ELBOWS if mode is None else (mode.signs.elbows,)
         modes = [UruSigns(octant=octant, elbows=signs) for signs in elbows]
         turn = 0.0 if motor else 2.0 * math.pi
-        return forward.assemblies(self, poses[off_planes & inside], modes, angles, motor, turn)
+        return forward.confirmed(self, found, modes, angles, motor, turn)
 
 
 def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str, Any]) -> Uru:

@@ -68,7 +68,14 @@ def convergence_finding(reported: Reported) -> str:
             f"{goal.label}: {units.written(reached[-1], unit, 4)} at evaluation {first}, "
             f"not bettered in {count} evaluations"
         )
-    found = int(course.numbers[np.argmax(course.best == reached[-1])])
+    # the last round that has a feasible design has the result
+    last = course.rounds == course.rounds[np.isfinite(course.best)].max()
+    found = int(course.numbers[np.argmax(last & (course.best == reached[-1]))])
+    if course.rounds.max() > 1:
+        return (
+            f"{goal.label}: {units.written(reached[-1], unit, 4)} at evaluation {found} of {count}, in round "
+            f"{course.rounds[last][0]} of {course.rounds.max()}; later rounds ask for more"
+        )
     return (
         f"{goal.label} went from {units.written(reached[0], unit, 4)} (first feasible design, evaluation "
         f"{first}) to {units.written(reached[-1], unit, 4)} (evaluation {found} of {count})"
@@ -92,6 +99,7 @@ def _draw_objective(axes: Axes, course: History, reported: Reported) -> None:
     room = 0.06 * (np.ptp(shown) or abs(float(shown[0])) or 1.0)
     axes.set_ylim(float(shown.min()) - room, float(shown.max()) + room)
     _mark_first_feasible(axes, course)
+    _mark_rounds(axes, course)
     axes.set_ylabel(wrapped(f"{goal.label} [{units.name(unit)}]", 36), fontsize=TEXT)
     axes.legend(
         loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, fontsize=SMALL, markerscale=1.8
@@ -109,7 +117,14 @@ def _draw_violation(axes: Axes, course: History) -> None:
     axes.set_yscale("log")
     axes.set_ylabel("violation [–]\nline: least so far", fontsize=SMALL)
     _mark_first_feasible(axes, course)
+    _mark_rounds(axes, course)
     tidy(axes)
+
+
+def _mark_rounds(axes: Axes, course: History) -> None:
+    for start in course.numbers[1:][np.diff(course.rounds) > 0]:
+        label = "new round" if start == course.numbers[course.rounds > 1][0] else None
+        axes.axvline(start, color=GREY, linewidth=1.0, linestyle=(0, (1, 2)), label=label)
 
 
 def _mark_first_feasible(axes: Axes, course: History) -> None:

@@ -17,8 +17,8 @@ FloatArray = NDArray[np.float64]
 @dataclass(frozen=True)
 class History:
     """Arrays (N,) over the entries in order. ``objective``: SI, NaN where it has no value. ``best``: the best
-    feasible objective so far, NaN before there is one. ``violation``: NaN for failed entries; ``closest``:
-    the least so far."""
+    feasible objective so far in the entry's round, NaN before there is one. ``violation``: NaN for failed
+    entries; ``closest``: the least so far in the round. ``rounds``: each entry's."""
 
     numbers: NDArray[np.int64]
     objective: FloatArray
@@ -26,6 +26,7 @@ class History:
     feasible: NDArray[np.bool_]
     best: FloatArray
     closest: FloatArray
+    rounds: NDArray[np.int64]
 
     @property
     def first_feasible(self) -> int | None:
@@ -41,11 +42,19 @@ def history(problem: Problem, entries: tuple[Entry, ...]) -> History:
     feasible = np.array([e.evaluation.status == "feasible" for e in entries], dtype=np.bool_)
     better = np.fmin if goal.sense == "minimize" else np.fmax
     violation[~np.isfinite(violation)] = np.nan
+    rounds = np.array([entry.round for entry in entries], dtype=np.int64)
+    reached = np.where(feasible, objective, np.nan)
+
+    def so_far(accumulated: np.ufunc, values: FloatArray) -> FloatArray:
+        parts = [accumulated.accumulate(values[rounds == number]) for number in np.unique(rounds)]
+        return np.concatenate(parts) if parts else values
+
     return History(
         numbers=np.array([entry.number for entry in entries], dtype=np.int64),
         objective=objective,
         violation=violation,
         feasible=feasible,
-        best=better.accumulate(np.where(feasible, objective, np.nan)),
-        closest=np.fmin.accumulate(violation),
+        best=so_far(better, reached),
+        closest=so_far(np.fmin, violation),
+        rounds=rounds,
     )

@@ -6,13 +6,16 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from tpm_design.certificates.document import FILE as CERTIFICATE
 from tpm_design.problem import Evaluation, Goal
+from tpm_design.report.certified import certificate_lines
 from tpm_design.report.escape import code, code_cell, table, text
 from tpm_design.report.figures import FIGURES, Picture
 from tpm_design.report.readings import AT_BOUND, at_end, limiting, nearest_constraint, readings
 from tpm_design.report.reported import Reported
 from tpm_design.report.words import MOST_LISTED, asked, centre_text, options_text, range_text, shape_text
 from tpm_design.runs.folder import DESIGNS, LOG, STUDY, SUMMARY, TABLE
+from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import goal_unit, parameter_columns
 
 NONE = "–"
@@ -20,6 +23,7 @@ FILES = (
     (DESIGNS, "the result, with numeric errors"),
     (TABLE, "every evaluation"),
     (LOG, "every evaluation with exact numbers"),
+    (CERTIFICATE, "what is proved of the design, with its proof"),
     (STUDY, "the study as resolved"),
     (SUMMARY, "seed, versions, machine"),
 )
@@ -32,6 +36,7 @@ def report_markdown(reported: Reported, pictures: Sequence[Picture]) -> str:
         _question(reported),
         _design(reported),
         _metrics(reported),
+        certificate_lines(reported),
         _limits(reported),
         _search(reported),
         _figures(pictures),
@@ -250,11 +255,21 @@ def _search(reported: Reported) -> list[str]:
         f"- method: {code(settings.method)}{polish}",
         f"- seed {settings.seed}, budget {settings.budget} evaluations",
         f"- {len(entries)} evaluations: {feasible} feasible, {failed} failed",
+        *_rounds(entries),
         f"- {time}",
     ]
     lines += [f"- {words}" for words in _provenance(summary)]
     lines += [f"- {text(str(remark))}" for remark in summary.get("remarks") or ()]
     return lines
+
+
+def _rounds(entries: Sequence[Entry]) -> Iterable[str]:
+    rounds = max((entry.round for entry in entries), default=1)
+    if rounds > 1:
+        yield (
+            f"- {rounds} rounds: what broke the best design of one (a machine within the tolerances, a pose) "
+            "had to be met in the next; the slacks above are the least of these too"
+        )
 
 
 def _provenance(summary: Any) -> Iterable[str]:
@@ -274,11 +289,12 @@ def _figures(pictures: Sequence[Picture]) -> list[str]:
 
 
 def _caveats(reported: Reported) -> list[str]:
+    beyond = " beyond what is said above" if certificate_lines(reported) else ""
     return [
         "## Caveats",
         "",
         "- Distances to singularities and least values over the region are found by search (a lattice and "
-        "local refinement); they are not proved.",
+        f"local refinement); they are not proved{beyond}.",
         "- The numeric errors are estimates: the change between two resolutions. A constraint counts as met "
         "only on the unfavourable side of its error.",
         f"- Volumes and averages aim at a relative error of {reported.problem.accuracy.volume:g}; the "

@@ -100,17 +100,17 @@ def entry_to_json(entry: Entry) -> dict[str, Any]:
     data["violation"] = data["violation"] if math.isfinite(data["violation"]) else None
     data["metrics"] = {k: v if math.isfinite(v) else None for k, v in data["metrics"].items()}
     data["errors"] = {k: v if math.isfinite(v) else None for k, v in data["errors"].items()}
-    return {"id": entry.number, **data}
+    return {"id": entry.number, "round": entry.round, **data}
 
 
 def entry_from_json(data: Mapping[str, Any]) -> Entry:
     """The inverse of ``entry_to_json``."""
-    fields = {key: value for key, value in data.items() if key != "id"}
+    fields = {key: value for key, value in data.items() if key not in ("id", "round")}
     fields["violation"] = math.inf if fields["violation"] is None else fields["violation"]
     for key in ("metrics", "errors"):
         fields[key] = {k: math.nan if v is None else v for k, v in fields[key].items()}
     fields["pieces"] = {label: tuple(values) for label, values in fields["pieces"].items()}
-    return Entry(int(data["id"]), Evaluation(**fields))
+    return Entry(int(data["id"]), Evaluation(**fields), int(data.get("round", 1)))
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from tpm_design.certificates.verdict import Verdict
 from tpm_design.design_space import DesignSpace, octant_signs
 from tpm_design.errors import RefusedError
 from tpm_design.optimizers import check_pair, optimizer
 from tpm_design.optimizers.base import BudgetSpent, Optimizer
-from tpm_design.problem import Goal, Problem
+from tpm_design.problem import Goal, Problem, Sample
 from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch
 
 POLISH_SHARE = 0.25
@@ -37,15 +38,31 @@ class SearchPlan:
 
 
 @dataclass(frozen=True)
+class Round:
+    """One round of a search that certifies. ``best``: the entry that was certified, or was not feasible; None
+    if interrupted before. ``outcome``: the verdict's, "infeasible" or "interrupted"."""
+
+    number: int
+    samples: tuple[Sample, ...]
+    evaluations: int
+    best: int | None
+    outcome: str
+
+
+@dataclass(frozen=True)
 class SearchResult:
-    """The log in order, its best entry, and how it ended. ``ending``: "converged", "budget spent" or
-    "interrupted"; ``status`` one sentence with what to do where the result is not what was hoped for."""
+    """The log in order, its best entry, and how it ended. ``ending``: "converged", "budget spent",
+    "interrupted" or, of a search that certifies, "proved" or "not provable" (no round could help).
+    ``status``: one or more sentences with what to do where the result is not what was hoped for.
+    ``rounds`` and ``verdict`` (on ``best``): of a search that certifies, as far as it came."""
 
     entries: tuple[Entry, ...]
     best: Entry | None
     ending: str
     status: str
     remarks: tuple[str, ...]
+    rounds: tuple[Round, ...] = ()
+    verdict: Verdict | None = None
 
 
 def check_plan(problem: Problem, plan: SearchPlan) -> None:
@@ -84,34 +101,53 @@ def search(
     Ctrl-C ends the search as "interrupted" with everything evaluated so far.
     """
     check_plan(problem, plan)
-    method = optimizer(plan.method)
-    space = DesignSpace(problem.variables, problem.fixed, octant_signs(problem.modes))
     log = EvaluationLog(problem, workers=workers, record=record)
-    kept = int(POLISH_SHARE * plan.budget) if plan.polish is not None else 0
-    whole = UnitSearch(log, space, space.start(), max(1, plan.budget - kept), (1,) * len(problem.constraints))
-    remarks = _remarks(method, problem)
     try:
-        ending, detail = _run(method, whole, plan.seed)
-        if plan.polish is not None:
-            ending, detail = _polish(optimizer(plan.polish), whole, plan)
+        ending, detail = search_all(log, plan, plan.budget)
     except KeyboardInterrupt:
         ending, detail = "interrupted", "The search was interrupted."
     finally:
         log.close()
     best = log.best()
     status = status_sentence(problem, best, len(log.entries), detail)
-    return SearchResult(tuple(log.entries), best, ending, status, remarks)
+    return SearchResult(tuple(log.entries), best, ending, status, remarks_on(plan, problem))
 
 
-def _run(method: Optimizer, view: UnitSearch, seed: int) -> tuple[str, str]:
+def view_of(log: EvaluationLog, limit: int) -> UnitSearch:
+    """The whole design space, up to ``limit`` entries in the log."""
+    problem = log.problem
+    space = DesignSpace(problem.variables, problem.fixed, octant_signs(problem.modes))
+    return UnitSearch(log, space, space.start(), limit, (1,) * len(problem.constraints))
+
+
+def search_all(log: EvaluationLog, plan: SearchPlan, limit: int) -> tuple[str, str]:
+    """The whole-space method, then the polish; up to ``limit`` entries. The ending and a sentence on it."""
+    kept = int(POLISH_SHARE * limit) if plan.polish is not None else 0
+    whole = view_of(log, max(1, limit - kept))
+    ending, detail = run_method(optimizer(plan.method), whole, plan.seed)
+    if plan.polish is not None:
+        ending, detail = polish_best(optimizer(plan.polish), whole, limit, plan.seed)
+    return ending, detail
+
+
+def run_method(method: Optimizer, view: UnitSearch, seed: int) -> tuple[str, str]:
     try:
         return "converged", method.run(view, seed)
     except BudgetSpent:
         return "budget spent", "The budget was spent."
 
 
-def _polish(method: Optimizer, whole: UnitSearch, plan: SearchPlan) -> tuple[str, str]:
-    """Polish the best design, then the best one of every other choice of the discrete variables.
+def polish_best(
+    method: Optimizer,
+    whole: UnitSearch,
+    most: int,
+    seed: int,
+    *,
+    neighbourhoods: Sequence[float] = POLISH_NEIGHBOURHOODS,
+    in_order: bool = False,
+) -> tuple[str, str]:
+    """Polish the best design, then the best of every other choice of the discrete variables, up to ``most``
+    entries in the log. ``in_order``: the choices in the order of the log, not by their best.
 
     A local method starts in ever smaller neighbourhoods: minima over a region have kinks, at which one that
     begins with a large step leaves the valley and one that begins with a small step stays in it.
@@ -119,33 +155,36 @@ def _polish(method: Optimizer, whole: UnitSearch, plan: SearchPlan) -> tuple[str
     log = whole.log
     polished = set()
     ending, detail = "converged", "The search converged."
-    while len(log.entries) < plan.budget:
+    while len(log.entries) < most:
         choices: dict[tuple[object, ...], Entry] = {}
-        for entry in sorted(log.entries, key=log.rank):
-            choices.setdefault(_choice(whole.space, entry), entry)
+        for entry in log.entries if in_order else sorted(log.entries, key=log.rank):
+            choices.setdefault(discrete_choice(whole.space, entry), entry)
         left = [(key, entry) for key, entry in choices.items() if key not in polished]
         if not left or not whole.space.holding_discrete(left[0][1].evaluation.design).variables:
             break
-        key, entry = left[0]
-        before = log.rank(entry)
-        for share in POLISH_NEIGHBOURHOODS:
-            entry = min((e for e in log.entries if _choice(whole.space, e) == key), key=log.rank)
-            limit = min(plan.budget, len(log.entries) + POLISH_ROUND * whole.dimension)
+        key = left[0][0]
+        before = min(log.rank(e) for e in log.entries if discrete_choice(whole.space, e) == key)
+        for share in neighbourhoods:
+            entry = min((e for e in log.entries if discrete_choice(whole.space, e) == key), key=log.rank)
+            limit = min(most, len(log.entries) + POLISH_ROUND * whole.dimension)
             if limit > len(log.entries):
-                ending, detail = _run(method, whole.continuous_near(entry, share, limit), plan.seed)
-        after = min(log.rank(e) for e in log.entries if _choice(whole.space, e) == key)
+                ending, detail = run_method(method, whole.continuous_near(entry, share, limit), seed)
+        after = min(log.rank(e) for e in log.entries if discrete_choice(whole.space, e) == key)
         if after[0] >= before[0] and after[1] >= before[1] - POLISH_GAIN * abs(before[1]):
             polished.add(key)
-    if len(log.entries) >= plan.budget:
+    if len(log.entries) >= most:
         return "budget spent", "The budget was spent."
     return "converged", detail if ending == "converged" else "The search converged."
 
 
-def _choice(space: DesignSpace, entry: Entry) -> tuple[object, ...]:
+def discrete_choice(space: DesignSpace, entry: Entry) -> tuple[object, ...]:
+    """The values of the discrete variables."""
     return tuple(entry.evaluation.design[v.name] for v in space.variables if v.values)
 
 
-def _remarks(method: Optimizer, problem: Problem) -> tuple[str, ...]:
+def remarks_on(plan: SearchPlan, problem: Problem) -> tuple[str, ...]:
+    """What a reader of the result should know of the method."""
+    method = optimizer(plan.method)
     if problem.constraints and not method.abilities.constraints:
         return (
             f"{method.name} takes no constraints: it minimised the objective plus an exact penalty on the "
@@ -168,7 +207,7 @@ def binding(problem: Problem, best: Entry) -> tuple[Goal, float] | None:
 
 
 def status_sentence(problem: Problem, best: Entry | None, count: int, detail: str) -> str:
-    """How the search ended, in one or two sentences, with a remedy where nothing feasible was found."""
+    """How the search ended (``detail`` first, if any), with a remedy where nothing feasible was found."""
     if best is None:
         return f"{detail} No design was evaluated."
     if best.evaluation.status == "feasible":

@@ -31,24 +31,34 @@ FAILED = 1e6
 
 @dataclass(frozen=True)
 class Entry:
-    """One evaluation in the log, numbered from 0 in the order in which points were asked for."""
+    """One evaluation in the log, numbered from 0 in the order in which points were asked for. ``round``: from
+    1; each further one judges designs by more samples than those before."""
 
     number: int
     evaluation: Evaluation
+    round: int = 1
 
 
 class EvaluationLog:
-    """Every distinct design evaluated so far. The one place that counts evaluations.
+    """Every distinct design evaluated so far in one round. The one place that counts evaluations.
 
-    ``record`` is called with each entry, in order, as soon as it is there.
+    ``record`` is called with each entry, in order, as soon as it is there. ``first``: number of the first.
     """
 
     def __init__(
-        self, problem: Problem, *, workers: int, record: Callable[[Entry], None] = lambda entry: None
+        self,
+        problem: Problem,
+        *,
+        workers: int,
+        record: Callable[[Entry], None] = lambda entry: None,
+        first: int = 0,
+        round_number: int = 1,
     ) -> None:
         self.problem = problem
+        self.first = first
+        self.round_number = round_number
         self.entries: list[Entry] = []
-        self._numbers: dict[Key, int] = {}
+        self._places: dict[Key, int] = {}
         self._record = record
         self._pool = ThreadPoolExecutor(max_workers=workers) if workers > 1 else None
 
@@ -66,7 +76,7 @@ class EvaluationLog:
         keys = [design_key(design) for design in designs]
         fresh: dict[Key, Design] = {}
         for key, design in zip(keys, designs, strict=True):
-            if key not in self._numbers and key not in fresh:
+            if key not in self._places and key not in fresh:
                 fresh[key] = design
         allowed = max(0, limit - len(self.entries))
         wanted = list(fresh.items())[:allowed]
@@ -74,13 +84,13 @@ class EvaluationLog:
         for (key, _), result in zip(
             wanted, run(lambda item: evaluate(self.problem, item[1]), wanted), strict=True
         ):
-            entry = Entry(len(self.entries), result)
-            self._numbers[key] = entry.number
+            self._places[key] = len(self.entries)
+            entry = Entry(self.first + len(self.entries), result, self.round_number)
             self.entries.append(entry)
             self._record(entry)
         if len(wanted) < len(fresh):
             raise BudgetSpent
-        return [self.entries[self._numbers[key]].evaluation for key in keys]
+        return [self.entries[self._places[key]].evaluation for key in keys]
 
     def best(self) -> Entry | None:
         """As ``best_entry``."""
@@ -138,8 +148,14 @@ def rank(problem: Problem, entry: Entry) -> tuple[float, float, int]:
 
 
 def best_entry(problem: Problem, entries: Iterable[Entry]) -> Entry | None:
-    """The feasible entry of least objective, else the one of least violation; None if there is none."""
-    return min(entries, key=lambda entry: rank(problem, entry), default=None)
+    """The feasible entry of least objective in the last round that has one, else the one of least violation;
+    None if there is none."""
+
+    def key(entry: Entry) -> tuple[int, tuple[float, float, int]]:
+        feasible = entry.evaluation.status == "feasible"
+        return (-entry.round if feasible else 0, rank(problem, entry))
+
+    return min(entries, key=key, default=None)
 
 
 def design_key(design: Design) -> Key:

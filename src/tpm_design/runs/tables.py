@@ -71,6 +71,7 @@ class EvaluationTable:
     def headings(self) -> list[str]:
         return [
             "id",
+            "round",
             "status",
             "reason",
             *(column.heading for column in self._parameters),
@@ -85,6 +86,7 @@ class EvaluationTable:
         evaluation = entry.evaluation
         return [
             str(entry.number),
+            str(entry.round),
             evaluation.status,
             evaluation.reason,
             *design_cells(evaluation, self._parameters, self._units),

@@ -5,14 +5,18 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tpm_design.certificates.document import FILE as CERTIFICATE
+from tpm_design.certificates.document import document, write_document
+from tpm_design.certificates.verdict import Verdict
 from tpm_design.errors import UsageError, did_you_mean
 from tpm_design.problem import Design, Evaluation, evaluate
 from tpm_design.runs.folder import RunWriter, create_run_folder, provenance, text_hash
 from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, search
+from tpm_design.runs.rounds import Proving, search_certified
 from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import EvaluationTable, csv_line
 from tpm_design.study.design import choose_design
@@ -23,19 +27,19 @@ if TYPE_CHECKING:
 
     from tpm_design.study.study import Study
 
-NOT_CERTIFIED = "The study's tolerances are kept in study.yaml; this version proves nothing about them."
-
 
 @dataclass(frozen=True)
 class Run:
     """A finished search. ``best``: the best feasible evaluation, else the one of least violation.
-    ``evaluations``: the table of evaluations.csv, in the study's units. ``folder``: None if not written."""
+    ``evaluations``: the table of evaluations.csv, in the study's units. ``folder``: None if not written.
+    ``verdict``: on the best design, None where the study asks for none or nothing feasible was found."""
 
     best: Evaluation | None
     evaluations: pd.DataFrame
     status: str
     result: SearchResult
     folder: Path | None
+    verdict: Verdict | None = None
 
 
 def evaluate_design(study: Study, values: Mapping[str, float | str]) -> Evaluation:
@@ -81,10 +85,15 @@ def optimize_study(
         watch(entry)
 
     began = time.perf_counter()
-    result = search(study.problem, plan, workers=workers, record=record)
-    if study.certification is not None:
-        result = replace(result, remarks=(*result.remarks, NOT_CERTIFIED))
-    if writer is not None:
+    if study.certification is None:
+        result = search(study.problem, plan, workers=workers, record=record)
+    else:
+        proving = Proving(study.certification.tolerance, study.certification.boxes)
+        result = search_certified(study.problem, plan, proving, workers=workers, record=record)
+    if writer is not None and folder is not None:
+        if result.verdict is not None:
+            data = document(study.problem, study.resolved(), study.study_hash, result.verdict)
+            write_document(folder / CERTIFICATE, data)
         summary = {
             "status": result.status,
             "ending": result.ending,
@@ -97,6 +106,7 @@ def optimize_study(
             "budget": plan.budget,
             "workers": workers,
             "remarks": list(result.remarks),
+            **({} if study.certification is None else _rounds_data(result)),
             "study_hash": study.study_hash,
             "study_file_hash": text_hash(study_text),
             **provenance(),
@@ -104,7 +114,33 @@ def optimize_study(
         }
         writer.finish(result.entries, [result.best] if result.best else [], summary)
     best = None if result.best is None else result.best.evaluation
-    return Run(best, evaluations_frame(study, result.entries), result.status, result, folder)
+    table = evaluations_frame(study, result.entries)
+    return Run(best, table, result.status, result, folder, result.verdict)
+
+
+def _rounds_data(result: SearchResult) -> dict[str, Any]:
+    """For run.json: each round with its samples (SI), and what was certified."""
+    rounds = [
+        {
+            "round": one.number,
+            "evaluations": one.evaluations,
+            "best_id": one.best,
+            "outcome": one.outcome,
+            "samples": [asdict(sample) for sample in one.samples],
+        }
+        for one in result.rounds
+    ]
+    found = result.verdict
+    certificate = {
+        "outcome": None if found is None else found.outcome,
+        "requirements": {}
+        if found is None
+        else {
+            r.goal.label: {"outcome": r.outcome, "slack": r.slack, "reason": r.reason}
+            for r in found.requirements
+        },
+    }
+    return {"rounds": rounds, "certificate": certificate}
 
 
 def evaluations_frame(study: Study, entries: tuple[Entry, ...]) -> pd.DataFrame:

@@ -16,7 +16,7 @@ from tpm_design.study.model import LARGEST, ConstraintModel, Entry, ObjectiveMod
 from tpm_design.study.plain import plain
 from tpm_design.units import Units, unit_for
 
-_COLUMNS = {"id", "status", "reason", "violation", "seconds", "mode"}
+_COLUMNS = {"id", "round", "status", "reason", "violation", "seconds", "mode"}
 
 
 class GoalReader:

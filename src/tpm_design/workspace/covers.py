@@ -293,6 +293,8 @@ def _cover(statement, geometry, nominal, mode, tolerances, region, distance, roo
             return ENDED_SMALL, used
         letters[used] = LETTERS[AXIS_LETTER + axis]
         used += 1
+        if not statements.inherited(statement):
+            known = 0
         stack[depth] = box
         stack[depth, axis, 0] = middle
         bits[depth] = known

@@ -140,6 +140,17 @@ def nearest(region, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
+@kernel
+def _nearest_at(region, x, y, z):  # type: ignore[no-untyped-def]
+    return nearest(region, x, y, z)
+
+
+def nearest_pose(region: PlacedRegion, pose: tuple[float, float, float]) -> tuple[float, float, float]:
+    """The region's pose (m) nearest to one pose; that pose itself inside."""
+    x, y, z = _nearest_at(region, *pose)
+    return float(x), float(y), float(z)
+
+
 @inner
 def perpendicular(normal):  # type: ignore[no-untyped-def]
     """A unit vector perpendicular to a unit vector."""

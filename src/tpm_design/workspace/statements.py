@@ -123,6 +123,11 @@ def guide(statement: Any, geometry: Any, mode: Any, centre: Any, half: Any) -> A
     raise NotImplementedError
 
 
+def inherited(statement: Any) -> bool:
+    """Whether a slack that is > 0 on a box is so on its parts: not where every box has a guide of its own."""
+    raise NotImplementedError
+
+
 @componentwise("a[i] - b")
 def lowered(a: Any, b: Any) -> Any:
     """Every member of a tuple less a number."""
@@ -226,6 +231,24 @@ def frame_of(rows, b, of_b, of_rows):  # type: ignore[no-untyped-def]
 @formula(guide, Transmission)
 def _no_guide(statement, geometry, mode, centre, half):  # type: ignore[no-untyped-def]
     return 0.0
+
+
+@formula(inherited, Reach)
+@formula(inherited, Determinant)
+@formula(inherited, Regular)
+@formula(inherited, Serial)
+@formula(inherited, Frobenius)
+@formula(inherited, Transmission)
+def _the_same_on_parts(statement):  # type: ignore[no-untyped-def]
+    return True
+
+
+@formula(inherited, Condition)
+@formula(inherited, Slowest)
+@formula(inherited, Fastest)
+@formula(inherited, Sensitivity)
+def _others_on_parts(statement):  # type: ignore[no-untyped-def]
+    return False
 
 
 @inner

@@ -1,0 +1,75 @@
+"""What was proved of the reported design, read from the run's certificate."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from tpm_design.certificates.document import FILE
+from tpm_design.report.escape import code, code_cell, table, text
+from tpm_design.report.reported import Reported
+from tpm_design.report.words import asked, lengths_text
+from tpm_design.runs.tables import goal_unit
+from tpm_design.units import si_unit
+
+SENTENCES = {
+    "proved": "Proved over the whole region",
+    "refuted": "Refuted: at least one requirement is broken",
+    "undecided": "Not proved",
+}
+
+
+def certificate_lines(reported: Reported) -> list[str]:
+    """A section on the certificate; empty where the run has none, or one of another design."""
+    data = _certificate(reported)
+    if data is None:
+        return []
+    rows = []
+    stored = {str(one["label"]): one for one in data["requirements"]}
+    for goal in reported.problem.constraints:
+        one = stored.get(goal.label)
+        if one is None:
+            continue
+        unit = goal_unit(reported.problem, goal)
+        slack = one["slack"]
+        spare = "–" if slack is None else text(reported.study.units.written(float(slack), unit, 3))
+        bound = text(asked(goal, reported.study.units, unit))
+        rows.append([code_cell(goal.label), bound, text(str(one["outcome"])), spare, _why(reported, one)])
+    headings = ["requirement", "asked", "outcome", "proved to spare", "why"]
+    sentence = f"{SENTENCES[str(data['outcome'])]}, {_machines(reported, data['tolerance'])}."
+    lines = ["## What is proved", "", text(sentence), "", *table(headings, rows), ""]
+    return [*lines, f"[{FILE}]({FILE}) can be checked again: {code(f'tpm-design certify --check {FILE}')}."]
+
+
+def _certificate(reported: Reported) -> Mapping[str, Any] | None:
+    path = reported.run.folder / FILE
+    if reported.best is None or not path.is_file():
+        return None
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        return None
+    if not isinstance(data, dict) or data.get("design") != dict(reported.best.evaluation.design):
+        return None
+    return data
+
+
+def _machines(reported: Reported, tolerance: Mapping[str, float]) -> str:
+    parts = []
+    for name, bound in tolerance.items():
+        parameter = reported.problem.kind.parameter(name)
+        unit = si_unit(parameter.dimension if parameter else "length")
+        if bound > 0.0:
+            parts.append(f"{name} ± {reported.study.units.written(bound, unit, 4)}")
+    if not parts:
+        return "for the exact dimensions"
+    return f"for every machine within {', '.join(parts)} (each limb by itself, axis directions exact)"
+
+
+def _why(reported: Reported, one: Mapping[str, Any]) -> str:
+    breaking = one["breaking"]
+    if breaking is None or breaking["pose"] is None:
+        return text(str(one["reason"]))
+    at = lengths_text(breaking["pose"], reported.study.units)
+    return text(f"broken at {at}: {one['reason']}")
