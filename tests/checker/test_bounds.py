@@ -10,9 +10,10 @@ import pytest
 from flint import arb
 from numba import njit
 
-from tpm_design.checker.balls import Enclosure, Symmetric, congruent, constant, full, positive_definite
+from tpm_design.checker.balls import Enclosure, Symmetric, constant, full, wide_product
 from tpm_design.checker.claims import Machine
-from tpm_design.checker.proof import Machines, all_positive, graded, natural, spans_of
+from tpm_design.checker.definite import congruent, positive_definite, positive_definite_throughout
+from tpm_design.checker.proof import Machines, all_positive, graded, natural, proved, spans_of
 from tpm_design.checker.regions import Box, Domain, Region
 from tpm_design.checker.spectrum import eigenpairs, singular_pairs, unit_frame
 from tpm_design.checker.statements import (
@@ -341,13 +342,13 @@ def test_a_symmetric_matrix_is_told_to_be_positive_definite_exactly_when_it_is()
     for _ in range(200):
         matrix = random.normal(size=(3, 3))
         matrix = matrix + matrix.T + random.uniform(-1.0, 6.0) * np.eye(3)
-        entries = [float(matrix[place]) for place in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]
+        entries = [float(matrix[place]) for place in ENTRIES]
         p, q, r, u, v, w = (constant(arb(entry)) for entry in entries)
         symmetric = Symmetric((p, q, r), (u, v, w))
         assert [[float(entry.value) for entry in row] for row in full(symmetric)] == matrix.tolist()
         definite = bool(np.linalg.eigvalsh(matrix).min() > 0.0)
         frame = unit_frame(matrix.tolist())
-        assert positive_definite(symmetric) == definite == (frame is not None)
+        assert positive_definite([arb(entry) for entry in entries]) == definite == (frame is not None)
         if frame is not None:
             turned = congruent([[arb(part) for part in row] for row in frame], [arb(e) for e in entries])
             unit = np.asarray(frame) @ matrix @ np.asarray(frame).T
@@ -355,24 +356,87 @@ def test_a_symmetric_matrix_is_told_to_be_positive_definite_exactly_when_it_is()
             assert [float(part) for part in turned] == pytest.approx([1, 1, 1, 0, 0, 0], abs=1e-6)
 
 
-def test_conditioning_is_proved_close_to_its_least_value_for_every_machine_within_tolerance() -> None:
-    """At a corner of a cube, where two singular values are equal and each machine parts them otherwise."""
-    sizes = {"db": 0.18578, "dp": 0.06, "f": 0.23051, "r": 0.17549, "k": 1.0}
-    nominal = {name: (value, value, value) for name, value in sizes.items()}
-    machine = Machine(nominal, {"db": 1e-4, "f": 1e-4, "r": 1e-4}, {}, "+++", "+++")
-    pose = np.full(3, 0.2549)
+def test_a_product_of_balls_keeps_the_signs_of_its_factors() -> None:
+    near, far = arb(0.01).union(arb(1)), arb(0.02).union(arb(3))
+    for one, other, sign in ((near, far, 1), (-near, far, -1), (-near, -far, 1)):
+        found = wide_product(one, other) * sign
+        assert found > 0
+        assert found.contains(arb(0.01) * arb(0.02))
+        assert found.contains(arb(3))
+    assert wide_product(near, arb(0, 1)).contains(-1)
+
+
+def test_the_rotation_determinant_has_one_sign_in_a_large_box_of_an_octant() -> None:
+    machines = MADE.within_tolerance()
+    wide = (0.01, 0.3)
+    assert all_positive(Locus("rotation", 0.0), machines, spans_of(machines, (wide, wide, wide)))
+
+
+ENTRIES = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))
+
+
+def test_a_matrix_is_positive_definite_throughout_a_cube_exactly_when_it_is_at_the_corners() -> None:
+    random = np.random.default_rng(14)
+    signs = np.asarray(list(itertools.product((-1.0, 1.0), repeat=6)))
+    told = {True: 0, False: 0}
+    for _ in range(60):
+        swings = random.normal(size=(6, 3, 3))
+        swings += np.swapaxes(swings, 1, 2)
+        swings *= random.uniform(0.05, 0.12)
+        corners = np.eye(3) + np.tensordot(signs, swings, axes=1)
+        least = float(np.linalg.eigvalsh(corners).min())
+        balls = [[arb(float(swing[place])) for place in ENTRIES] for swing in swings]
+        for unknown in (0.0, 1e-3):
+            middle = [arb(float(np.eye(3)[place]), unknown) for place in ENTRIES]
+            if abs(least) > 1e-12 and not 0.0 < least < 3.0 * unknown:
+                assert positive_definite_throughout(middle, balls) == (least > 0.0)
+                told[least > 0.0] += 1
+        # the least eigenvalue of all is what may be taken away, by what is unknown too
+        short = [arb(float(np.eye(3)[place]), 0.34 * least if least > 0.0 else 0.0) for place in ENTRIES]
+        assert not positive_definite_throughout(short, balls)
+    assert min(told.values()) > 20
+
+
+SIZES = {"db": 0.185804, "dp": 0.06, "f": 0.232357, "r": 0.176357, "k": 1.0}
+NOMINAL = {name: (value, value, value) for name, value in SIZES.items()}
+MADE = Machine(NOMINAL, {"db": 1e-4, "f": 1e-4, "r": 1e-4}, {}, "+++", "+++")
+"""Made so precisely, it has two singular values that are equal where x = y = z."""
+
+
+def least_conditioning(pose: float) -> float:
+    """Least 1/κ₂ at (x, x, x) of the machines at the ends of the tolerances."""
     least = 1.0
     for signs in itertools.product((-1e-4, 1e-4), repeat=9):
         moved = dict(zip(("db", "f", "r"), np.reshape(signs, (3, 3)), strict=True))
-        worst = {name: np.add(nominal[name], moved.get(name, 0.0)).tolist() for name in nominal}
+        worst = {name: np.add(NOMINAL[name], moved.get(name, 0.0)).tolist() for name in NOMINAL}
         built = mechanism_kind("uru").build(worst, {})
         mode = built.mode_of({"octant": "+++", "elbows": "+++"})
-        values = index_values(built.geometry, mode.signs, Index(CONDITION_2), pose.reshape(1, 3))
+        values = index_values(built.geometry, mode.signs, Index(CONDITION_2), np.full((1, 3), pose))
         least = min(least, float(values[0]))
-    machines = machine.within_tolerance()
-    spans = spans_of(machines, around(pose, 1e-6))
-    assert all_positive(Condition("motor", 0.985 * least), machines, spans)
+    return least
+
+
+@pytest.mark.parametrize("pose", [0.2, 0.24, 0.256133])
+def test_conditioning_is_proved_close_to_its_least_value_for_every_machine_within_tolerance(
+    pose: float,
+) -> None:
+    """Each machine parts the two equal singular values otherwise."""
+    least = least_conditioning(pose)
+    machines = MADE.within_tolerance()
+    spans = spans_of(machines, around(np.full(3, pose), 1e-6))
+    assert all_positive(Condition("motor", 0.996 * least), machines, spans)
     assert not all_positive(Condition("motor", least * (1.0 + 1e-6)), machines, spans)
+
+
+def test_a_leaf_at_a_double_singular_value_is_proved_again_by_halving_it() -> None:
+    """The corner of a cube, with the slack that a certificate leaves."""
+    machines = MADE.within_tolerance()
+    corner = 0.256133
+    box: Box = ((corner - 4e-4, corner), (corner - 2e-4, corner), (corner - 4e-4, corner))
+    domain = Domain(Region("box", (0.156133,) * 3, (0.1, 0.1, 0.1)), 0.0)
+    floor = 0.995 * least_conditioning(corner)
+    assert proved(Condition("motor", floor), machines, domain, box)
+    assert not proved(Condition("motor", 1.01 * floor), machines, domain, box)
 
 
 @pytest.mark.parametrize(("statement", "index", "rising"), CASES)

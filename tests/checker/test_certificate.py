@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from prover import CENTRE, CONSTRAINTS, Certificate, prove, signed, unproved, written
 
-from tpm_design.checker import check_certificate
+from tpm_design.checker import Progress, check_certificate, reproof
 from tpm_design.checker.cover import Cover, leaves
 from tpm_design.checker.regions import Domain, Region
 from tpm_design.errors import UsageError
@@ -50,6 +50,41 @@ def test_what_was_proved_is_accepted(metric: str, tmp_path: Path) -> None:
     trees = [cover["tree"] for statement in certificate["statements"] for cover in statement["covers"]]
     assert result.leaves == sum(tree.count(letter) for tree in trees for letter in "pon")
     assert len(result.lines) == len(certificate["statements"]) + 1
+
+
+def test_any_number_of_processes_finds_the_same(
+    quick: Certificate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reproof, "WORTH_A_PROCESS", 1)
+    monkeypatch.setattr(reproof, "TOGETHER", 3)
+    false = copy.deepcopy(quick)
+    kind(false, "frobenius")["floor"] = 0.999
+    for certificate in (quick, signed(false)):
+        found = []
+        for workers in (1, 2):
+            told: list[Progress] = []
+            result = check_certificate(written(certificate, tmp_path), workers=workers, watch=told.append)
+            found.append((result.valid, result.lines, result.faults, result.leaves, told))
+        assert found[0] == found[1]
+    assert "frobenius" in found[0][2][0].lower()
+
+
+def test_the_watcher_sees_all_leaves_done_in_the_end(quick: Certificate, tmp_path: Path) -> None:
+    told: list[Progress] = []
+    result = check_certificate(written(quick, tmp_path), watch=told.append)
+    assert [progress.done for progress in told] == sorted({progress.done for progress in told})
+    assert told[-1] == Progress(result.leaves, result.leaves)
+
+
+def test_a_contradiction_is_told_before_anything_is_proved_again(quick: Certificate, tmp_path: Path) -> None:
+    false = copy.deepcopy(quick)
+    false["requirements"][1]["slack"] = 1.0
+    kind(false, "frobenius")["floor"] = 0.999
+    told: list[Progress] = []
+    result = check_certificate(written(signed(false), tmp_path), watch=told.append)
+    assert len(result.faults) == 1
+    assert "slack" in result.faults[0]
+    assert (result.leaves, told) == (0, [])
 
 
 REGIONS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -192,7 +227,7 @@ FALSE: dict[str, tuple[Callable[[Certificate], None], str]] = {
     "covers gone": (change("statements.4.covers", []), "leave out"),
     "root shrunk": (shrink_root, "leave out"),
     "tolerance of the machine alone": (change("tolerance.f", 2e-4), "tolerance"),
-    "tolerance": (wider_tolerance, "proved again"),
+    "tolerance": (wider_tolerance, "longer"),
     "machine alone": (change("machine.parameters.f.1", 0.2441), "design"),
     "fixed parameter": (change("design.dp", 0.061), "design"),
     "machine": (smaller_machine, "proved again"),
@@ -273,6 +308,31 @@ def test_a_refuted_requirement_fails_at_its_breaking_pose(metric: str, tmp_path:
     if metric != "total_link_length":
         certificate["requirements"][0]["breaking"]["pose"] = [0.36, 0.155, 0.15]
         assert "not" in faults(signed(certificate), tmp_path)[0]
+
+
+def test_links_too_long_need_no_pose_to_show_it(tmp_path: Path) -> None:
+    certificate = refuted("total_link_length", 1000)
+    certificate["requirements"][0]["breaking"]["pose"] = None
+    assert faults(signed(certificate), tmp_path) == ()
+    certificate = refuted("velocity_max", 1)
+    certificate["requirements"][0]["breaking"]["pose"] = None
+    assert "no pose" in faults(signed(certificate), tmp_path)[0]
+
+
+def test_a_statement_that_is_not_proved_may_ask_for_nothing(tmp_path: Path) -> None:
+    certificate = refuted("velocity_max", 0)
+    for statement in certificate["statements"]:
+        statement["ceiling" if statement["kind"] == "fastest" else "floor"] = 0.0
+    assert faults(signed(certificate), tmp_path) == ()
+    kind(certificate, "determinant")["outcome"] = "proved"
+    with pytest.raises(UsageError, match="floor is not greater than 0"):
+        faults(signed(certificate), tmp_path)
+
+
+def test_a_distance_of_nothing_is_kept_by_any_distance(tmp_path: Path) -> None:
+    certificate = unproved(["rotation_singularity_distance"])
+    certificate["study"]["constraints"][0]["min"] = certificate["requirements"][0]["min"] = 0
+    assert faults(prove(certificate), tmp_path) == ()
 
 
 @pytest.mark.parametrize("metric", BREAKING)

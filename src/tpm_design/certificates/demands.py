@@ -160,5 +160,7 @@ def _bound(goal: Goal) -> tuple[float, bool]:
             raise NoProofError(
                 f"{goal.metric.name} is proved in its good direction only, and this bound asks for less"
             )
+        if wanted < 0.0:
+            raise NoProofError("a bound below 0 has no proof here: ask for 0 or more")
     bound = goal.minimum if goal.minimum is not None else goal.maximum
     return float(bound if bound is not None else 0.0), goal.maximum is not None

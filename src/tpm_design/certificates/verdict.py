@@ -102,6 +102,8 @@ def _needs(goal: Goal, context: Context) -> tuple[Demand, ...] | str:
     kind = context.mechanism.kind
     signs = [1.0] * len(kind.determinants)
     if context.region is not None:
+        if goal.metric.name == "coverage" and len(context.region.points) > 1:
+            return "no proof here that separate poses lie in one aspect"
         signs = [1.0 if low + high >= 0.0 else -1.0 for low, high in _ranges(context)]
     try:
         return demands(goal, kind, signs)
@@ -123,6 +125,9 @@ def _requirement(goal: Goal, numbers: list[int], settlements: tuple[Settlement, 
         return Requirement(goal, outcome, _slack(needed), tuple(numbers), None, "", worst)
     first = next(settlement for settlement in needed if settlement.outcome == outcome)
     reason = f"{_named(first.demand)}: {first.reason}"
+    if outcome == "refuted" and goal.metric.name == "coverage" and (goal.minimum or 0.0) < 1.0:
+        reason = f"{reason}, which says nothing of a share below 1"
+        return Requirement(goal, "undecided", None, tuple(numbers), None, reason, worst)
     return Requirement(goal, outcome, None, tuple(numbers), first.breaking, reason, worst)
 
 

@@ -5,5 +5,6 @@ rooms that make certificates.
 """
 
 from tpm_design.checker.certificate import CheckResult, check_certificate
+from tpm_design.checker.reproof import Progress
 
-__all__ = ["CheckResult", "check_certificate"]
+__all__ = ["CheckResult", "Progress", "check_certificate"]

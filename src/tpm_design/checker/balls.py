@@ -77,6 +77,11 @@ def square(argument: Enclosure) -> Enclosure:
     return chained(wide_square(argument.value), ((2 * argument.value, argument),))
 
 
+def product(one: Enclosure, other: Enclosure) -> Enclosure:
+    """As ``*``, and bounded by the ends where signs are known."""
+    return chained(wide_product(one.value, other.value), ((other.value, one), (one.value, other)))
+
+
 def root(argument: Enclosure) -> Enclosure:
     """Square root, of 0 where the argument is negative. Without a bound on the slope where it may be 0."""
     value = argument.value
@@ -141,6 +146,14 @@ def wide_square(ball: arb) -> arb:
     return (ball.abs_lower() ** 2).union(ball.abs_upper() ** 2)
 
 
+def wide_product(ball: arb, other: arb) -> arb:
+    """ball · other from their ends where neither holds 0: it then keeps their signs."""
+    if not ((ball > 0 or ball < 0) and (other > 0 or other < 0)):
+        return ball * other
+    size = (ball.abs_lower() * other.abs_lower()).union(ball.abs_upper() * other.abs_upper())
+    return size if (ball > 0) == (other > 0) else -size
+
+
 def unbounded(argument: Enclosure) -> Slope:
     return dict.fromkeys(argument.slope, UNBOUNDED)
 
@@ -194,34 +207,7 @@ class Symmetric(NamedTuple):
     beside: Triple
 
 
-def positive_definite(matrix: Symmetric) -> bool:
-    """Whether all eigenvalues are > 0, whatever the entries are: by the characteristic polynomial."""
-    p, q, r = (entry.value for entry in matrix.diagonal)
-    u, v, w = (entry.value for entry in matrix.beside)
-    first, second, third = q * r - u * u, r * p - v * v, p * q - w * w
-    determinant = p * first + w * (u * v - w * r) + v * (w * u - v * q)
-    return bool(p + q + r > 0 and first + second + third > 0 and determinant > 0)
-
-
 def full(matrix: Symmetric) -> list[list[Enclosure]]:
     """Its three rows."""
     (p, q, r), (u, v, w) = matrix
     return [[p, w, v], [w, q, u], [v, u, r]]
-
-
-def congruent(lower: Sequence[Sequence[arb]], entries: Sequence[arb]) -> list[arb]:
-    """P M Pᵀ of a lower triangular P and a symmetric M, given and returned as entries 11, 22, 33, 23, 31,
-    12."""
-    (a, _, _), (b, c, _), (d, e, f) = lower
-    p, q, r, u, v, w = entries
-    # rows of P M
-    second = (b * p + c * w, b * w + c * q, b * v + c * u)
-    third = (d * p + e * w + f * v, d * w + e * q + f * u, d * v + e * u + f * r)
-    return [
-        a * a * p,
-        b * second[0] + c * second[1],
-        d * third[0] + e * third[1] + f * third[2],
-        b * third[0] + c * third[1],
-        a * third[0],
-        a * second[0],
-    ]

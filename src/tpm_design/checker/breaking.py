@@ -30,7 +30,7 @@ def not_broken(requirement: Requirement, machine: Machine, region: Region | None
     """Why a requirement is not refuted by its breaking pose; None where it is."""
     breaking = requirement.breaking
     if breaking is None:
-        return "no pose that breaks it is given"
+        return "nothing that breaks it is given"
     tolerances = machine.tolerances()
     for name in PARAMETERS:
         for value, nominal, tolerance in zip(
@@ -41,21 +41,24 @@ def not_broken(requirement: Requirement, machine: Machine, region: Region | None
     machines = machine.exactly(breaking.parameters)
     if requirement.metric == "total_link_length":
         return None if _length_broken(requirement, machines) else "the links are as long as is asked"
+    pose = breaking.pose
+    if pose is None:
+        return "no pose that breaks it is given"
     rule = rule_of(requirement)
     bound = None if rule is None else requirement.least if rule.bound == "min" else requirement.greatest
     if region is None or bound is None:
         return "no pose alone can break it"
     if requirement.metric == "coverage" and bound < 1.0:
         return "no pose alone can break a coverage of less than 1"
-    at = _configuration(machines, breaking.pose)
-    inside = _within(region, breaking.pose, 0.0)
-    if inside and _unreachable(at, breaking.pose):
+    at = _configuration(machines, pose)
+    inside = _within(region, pose, 0.0)
+    if inside and _unreachable(at, pose):
         return None
     if requirement.metric.endswith("_singularity_distance"):
         name = requirement.metric.removesuffix("_singularity_distance")
-        if not _within(region, breaking.pose, bound):
+        if not _within(region, pose, bound):
             return "the pose that breaks it is not within the distance of the region"
-        if _out_of_reach(at, breaking.pose):
+        if _out_of_reach(at, pose):
             return "the pose that breaks it is not in reach"
         crossed = _crossed(at, machines, region, (name,))
         return None if crossed else "the determinant has the region's sign at the pose that breaks it"

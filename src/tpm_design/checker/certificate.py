@@ -19,12 +19,13 @@ from tpm_design.checker.claims import (
     read_region,
     read_requirement,
 )
-from tpm_design.checker.cover import leaves
+from tpm_design.checker.cover import Cover, leaves
 from tpm_design.checker.fields import AlteredError, Fields, canonical_sha256, read_certificate
-from tpm_design.checker.proof import Machines, never_reached, proved, sum_of_links
+from tpm_design.checker.proof import sum_of_links
 from tpm_design.checker.regions import Box, Domain, Region
+from tpm_design.checker.reproof import Claimed, Watch, first_failure
 from tpm_design.checker.requirements import proved_slack, unproved
-from tpm_design.checker.statements import Length, Locus, Statement
+from tpm_design.checker.statements import Length, Locus
 from tpm_design.errors import UsageError
 
 FORMAT = 1
@@ -43,15 +44,23 @@ class CheckResult:
     seconds: float
 
 
-def check_certificate(path: str | Path) -> CheckResult:
-    """Checks a ``certificate.json``. Raises UsageError where the file is none of a format known here."""
+def check_certificate(
+    path: str | Path, *, workers: int = 1, watch: Watch = lambda progress: None
+) -> CheckResult:
+    """Checks a ``certificate.json``, with up to ``workers`` processes; the result is the same for any number.
+
+    What contradicts itself or its study is told before anything is proved again, and the first leaf that
+    cannot be proved again ends the check. ``watch`` is told how many leaves are done. With more than one
+    worker the caller's main module must be one that can be imported. Raises UsageError where the file is none
+    of a format known here.
+    """
     began = time.perf_counter()
     try:
         certificate = read_certificate(Path(path))
     except AlteredError as error:
         return CheckResult(False, (), (f"altered: {error}",), 0, time.perf_counter() - began)
     check = _Check()
-    check.run(certificate)
+    check.run(certificate, workers, watch)
     return CheckResult(
         not check.faults, tuple(check.lines), tuple(check.faults), check.leaves, time.perf_counter() - began
     )
@@ -65,7 +74,7 @@ class _Check:
         self.faults: list[str] = []
         self.leaves = 0
 
-    def run(self, certificate: Fields) -> None:
+    def run(self, certificate: Fields, workers: int, watch: Watch) -> None:
         body = {key: value for key, value in certificate.data.items() if key != "sha256"}
         if certificate.text("sha256") != canonical_sha256(body):
             self.faults.append("altered: the SHA-256 of the contents is not the one written")
@@ -87,61 +96,63 @@ class _Check:
         self.faults += disagreements(certificate, machine, region, requirements)
         if self.faults:
             return
-        machines = machine.within_tolerance()
-        for index, claim in enumerate(claims):
-            fault = self._claim(claim, machines, region)
-            self.lines.append(f"statement {index}, {claim.statement}: {fault or claim.outcome}")
-            if fault:
-                self.faults.append(f"statement {index}, {claim.statement}: {fault}")
         for requirement in requirements:
             self._requirement(requirement, claims, machine, region)
         self._outcome(outcome, requirements)
+        claimed = [
+            cover
+            for index, claim in enumerate(claims)
+            for cover in self._claimed(index, claim, machine, region)
+        ]
+        if self.faults:
+            return
+        failure, self.leaves = first_failure(machine, claimed, workers, watch)
+        if failure is not None:
+            index, (box, letter) = failure
+            self._unsound(index, claims[index], f"the leaf {letter} {_shown(box)} could not be proved again")
+            return
+        self.lines[:0] = [
+            f"statement {index}, {claim.statement}: {claim.outcome}" for index, claim in enumerate(claims)
+        ]
+
+    def _unsound(self, index: int, claim: Claim, fault: str) -> None:
+        self.faults.append(f"statement {index}, {claim.statement}: {fault}")
 
     def _assumptions(self, certificate: Fields) -> None:
         texts = certificate.items("assumptions")
         if not any(isinstance(text, str) and "axis directions are exact" in text for text in texts):
             self.faults.append("assumptions do not say that axis directions are exact")
 
-    def _claim(self, claim: Claim, machines: Machines, region: Region | None) -> str | None:
-        """What is wrong with a statement; None where nothing is."""
+    def _claimed(
+        self, index: int, claim: Claim, machine: Machine, region: Region | None
+    ) -> Iterator[Claimed]:
+        """The covers that are to be proved again."""
         statement = claim.statement
         if isinstance(statement, Length):
-            return _length_fault(statement, machines) if claim.outcome == "proved" else None
+            fault = _length_fault(statement, machine) if claim.outcome == "proved" else None
+            if fault is not None:
+                self._unsound(index, claim, fault)
+            return
         if region is None:
-            return "there is no region that it could speak of"
+            self._unsound(index, claim, "there is no region that it could speak of")
+            return
         if claim.outcome != "proved" and not claim.covers:
-            return None
+            return
         distance = statement.distance if isinstance(statement, Locus) else 0.0
         domains = [Domain(body, distance) for body in region.parts]
-        return self._covers(claim, statement, machines, domains)
-
-    def _covers(
-        self, claim: Claim, statement: Statement, machines: Machines, domains: list[Domain]
-    ) -> str | None:
-        roots = [cover.root for cover in claim.covers]
-        if len(domains) == 1:
-            whole = domains[0].covered_by(roots)
-            paired = [(cover, domains[0]) for cover in claim.covers]
-        else:
-            if len(roots) != len(domains):
-                return f"there are {len(roots)} covers for {len(domains)} poses"
-            whole = all(domain.covered_by([root]) for domain, root in zip(domains, roots, strict=True))
-            paired = list(zip(claim.covers, domains, strict=True))
-        if not whole:
-            return "the covers leave out a part of the poses it speaks of"
-        for cover, domain in paired:
+        fault = _gap(claim, domains)
+        if fault is not None:
+            self._unsound(index, claim, fault)
+            return
+        # one body may have several covers, several poses have one each
+        pairs = zip(claim.covers, domains if len(domains) > 1 else domains * len(claim.covers), strict=True)
+        for cover, domain in pairs:
             try:
-                for box, letter in leaves(cover):
-                    if letter == "u":
-                        if claim.outcome == "proved":
-                            return f"it has an undecided leaf {_shown(box)}"
-                        continue
-                    self.leaves += 1
-                    if not _leaf_holds(statement, machines, domain, box, letter):
-                        return f"the leaf {letter} {_shown(box)} could not be proved again"
+                size = _size(cover, claim.outcome == "proved")
             except ValueError as error:
-                return str(error)
-        return None
+                self._unsound(index, claim, str(error))
+                return
+            yield Claimed(index, statement, domain, cover, size)
 
     def _requirement(
         self, requirement: Requirement, claims: list[Claim], machine: Machine, region: Region | None
@@ -159,15 +170,32 @@ class _Check:
             self.faults.append(f"outcome is {outcome}, by its requirements it is {due}")
 
 
-def _leaf_holds(statement: Statement, machines: Machines, domain: Domain, box: Box, letter: str) -> bool:
-    if letter == "o":
-        return domain.outside(box)
-    if letter == "n":
-        return isinstance(statement, Locus) and never_reached(machines, box)
-    return proved(statement, machines, domain, box)
+def _gap(claim: Claim, domains: list[Domain]) -> str | None:
+    """Whether the covers leave anything out."""
+    roots = [cover.root for cover in claim.covers]
+    if len(domains) == 1:
+        whole = domains[0].covered_by(roots)
+    elif len(roots) != len(domains):
+        return f"there are {len(roots)} covers for {len(domains)} poses"
+    else:
+        whole = all(domain.covered_by([root]) for domain, root in zip(domains, roots, strict=True))
+    return None if whole else "the covers leave out a part of the poses it speaks of"
 
 
-def _length_fault(statement: Length, machines: Machines) -> str | None:
+def _size(cover: Cover, whole: bool) -> int:
+    """How many leaves claim something. Raises ValueError where the tree is none, or ``whole`` and undecided
+    somewhere."""
+    size = 0
+    for box, letter in leaves(cover):
+        if letter != "u":
+            size += 1
+        elif whole:
+            raise ValueError(f"it has an undecided leaf {_shown(box)}")
+    return size
+
+
+def _length_fault(statement: Length, machine: Machine) -> str | None:
+    machines = machine.within_tolerance()
     floor, ceiling = statement.floor, statement.ceiling
     if floor is not None and not sum_of_links(machines, False) >= floor:
         return "the links may be shorter"

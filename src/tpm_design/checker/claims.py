@@ -46,9 +46,9 @@ class Claim:
 
 @dataclass(frozen=True)
 class Breaking:
-    """A pose and a machine at which a requirement fails."""
+    """A pose and a machine at which a requirement fails; without a pose where it asks nothing of poses."""
 
-    pose: Point
+    pose: Point | None
     parameters: Parameters
 
 
@@ -184,14 +184,17 @@ def read_claim(entry: Fields) -> Claim:
     return Claim(KINDS[kind](entry), entry.text("outcome", OUTCOMES), tuple(covers))
 
 
-def _floor(entry: Fields) -> float:
-    floor = entry.number("floor")
-    return floor if floor >= 0.0 else entry.refuse("floor", "0 or more")
+def _level(entry: Fields, key: str) -> float:
+    value = entry.number(key)
+    return value if value >= 0.0 else entry.refuse(key, "0 or more")
 
 
 def _positive(entry: Fields, key: str) -> float:
-    value = entry.number(key)
-    return value if value > 0.0 else entry.refuse(key, "greater than 0")
+    """A level at which nothing can be proved where it is 0; what is not proved may still ask for that."""
+    value = _level(entry, key)
+    if value == 0.0 and entry.text("outcome") == "proved":
+        entry.refuse(key, "greater than 0")
+    return value
 
 
 def _drive(entry: Fields) -> str:
@@ -206,16 +209,16 @@ def _determinant(entry: Fields) -> Determinant:
 
 
 KINDS: Mapping[str, Callable[[Fields], Statement | Length]] = {
-    "reach": lambda entry: Reach(_floor(entry)),
+    "reach": lambda entry: Reach(_level(entry, "floor")),
     "determinant": _determinant,
-    "serial": lambda entry: Serial(_floor(entry)),
-    "frobenius": lambda entry: Frobenius(_drive(entry), _floor(entry)),
-    "condition": lambda entry: Condition(_drive(entry), _floor(entry)),
-    "slowest": lambda entry: Slowest(_drive(entry), _floor(entry)),
+    "serial": lambda entry: Serial(_level(entry, "floor")),
+    "frobenius": lambda entry: Frobenius(_drive(entry), _level(entry, "floor")),
+    "condition": lambda entry: Condition(_drive(entry), _level(entry, "floor")),
+    "slowest": lambda entry: Slowest(_drive(entry), _level(entry, "floor")),
     "fastest": lambda entry: Fastest(_drive(entry), _positive(entry, "ceiling")),
-    "transmission": lambda entry: Transmission(_floor(entry)),
+    "transmission": lambda entry: Transmission(_level(entry, "floor")),
     "sensitivity": lambda entry: Sensitivity(_drive(entry), _positive(entry, "ceiling")),
-    "locus": lambda entry: Locus(entry.text("name", DETERMINANTS), _positive(entry, "distance")),
+    "locus": lambda entry: Locus(entry.text("name", DETERMINANTS), _level(entry, "distance")),
     "length": lambda entry: Length(entry.number_or_none("floor"), entry.number_or_none("ceiling")),
 }
 
@@ -227,7 +230,8 @@ def read_requirement(entry: Fields, statements: int) -> Requirement:
     breaking = None
     if entry.value("breaking") is not None:
         given = entry.fields("breaking")
-        breaking = Breaking(given.triple("pose"), read_parameters(given.fields("parameters")))
+        pose = None if given.value("pose") is None else given.triple("pose")
+        breaking = Breaking(pose, read_parameters(given.fields("parameters")))
     return Requirement(
         entry.text("label"),
         entry.text("metric"),

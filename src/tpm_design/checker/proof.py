@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from flint import arb
 
-from tpm_design.checker.balls import ZERO, Enclosure, congruent, full, positive_definite
+from tpm_design.checker.balls import ZERO, Enclosure, Symmetric, full
+from tpm_design.checker.definite import congruent, positive_definite_throughout
 from tpm_design.checker.regions import Box, Domain
 from tpm_design.checker.spectrum import unit_frame
-from tpm_design.checker.statements import Goal, Locus, Reach, Statement, SymmetricGoal, outside_goals
+from tpm_design.checker.statements import Goal, Locus, Reach, Statement, outside_goals
 from tpm_design.checker.uru import AXES, LIMBS, Configuration, JointRange, Mode
 
 ONE = arb(1)
@@ -80,46 +81,39 @@ def positive(goal: Goal, slopes: Configuration, machines: Machines, spans: Spans
     return bool(goal(Configuration(machines.mode, machines.limits, variables)).value - loss > 0)
 
 
-def definite(goal: SymmetricGoal, slopes: Configuration, middle: Configuration, spans: Spans) -> bool:
-    """Whether all eigenvalues of a matrix are > 0 on the whole box, by its derivatives there.
+def definite(over: Symmetric, centre: Symmetric, spans: Spans) -> bool:
+    """Whether all eigenvalues of a matrix are > 0 on the whole box, by its derivatives there (``over``) and
+    its entries in the middle (``centre``).
 
     P M Pᵀ is near the unit matrix for the P that makes it so in the middle, which is chosen in plain numbers;
-    by the mean value theorem its entries stay close, and by Gershgorin's its eigenvalues do.
+    by the mean value theorem it is a linear function of the variables whose slopes are somewhere in theirs.
     """
-    centre = goal(middle)
     frame = unit_frame([[float(entry.value) for entry in row] for row in full(centre)])
     if frame is None:
         return False
     factors = [[arb(part) for part in row] for row in frame]
     moved: dict[str, list[arb]] = {}
-    over = goal(slopes)
     for place, entry in enumerate((*over.diagonal, *over.beside)):
         for name, part in entry.slope.items():
             moved.setdefault(name, [ZERO] * 6)[place] = part
     at = congruent(factors, [entry.value for entry in (*centre.diagonal, *centre.beside)])
-    spread = [ZERO] * 6
-    for name, parts in moved.items():
-        radius = spans[name].radius
-        turned = congruent(factors, parts)
-        spread = [total + part.abs_upper() * radius for total, part in zip(spread, turned, strict=True)]
-    beside = [abs(at[n]) + spread[n] for n in (3, 4, 5)]
-    return all(at[n] - spread[n] - beside[(n + 1) % 3] - beside[(n + 2) % 3] > 0 for n in LIMBS)
+    swings = [
+        [part * spans[name].radius for part in congruent(factors, parts)] for name, parts in moved.items()
+    ]
+    return positive_definite_throughout(at, swings)
 
 
 def all_positive(statement: Statement, machines: Machines, spans: Spans) -> bool:
     """Whether a statement holds on a box, by its bounds there."""
-    whole = natural(machines, spans)
-    goals = statement.goals(whole)
-    if all(goal(whole).value > 0 for goal in goals.quantities) and all(
-        positive_definite(matrix(whole)) for matrix in goals.matrices
-    ):
-        return True
     slopes, middle = graded(machines, spans)
     # goals of one configuration belong together: they may share a scale
     goals = statement.goals(slopes)
-    return all(
-        goal(whole).value > 0 or positive(goal, slopes, machines, spans) for goal in goals.quantities
-    ) and all(definite(matrix, slopes, middle, spans) for matrix in goals.matrices)
+    if not all(positive(goal, slopes, machines, spans) for goal in goals.quantities):
+        return False
+    if goals.matrices is None:
+        return True
+    over, centre = goals.matrices(slopes), goals.matrices(middle)
+    return all(definite(one, other, spans) for one, other in zip(over, centre, strict=True))
 
 
 def out_of_reach(machines: Machines, box: Box, spans: Spans) -> bool:
@@ -127,11 +121,9 @@ def out_of_reach(machines: Machines, box: Box, spans: Spans) -> bool:
     for (low, high), side in zip(box, machines.mode.octant, strict=True):
         if (side > 0 and high < 0.0) or (side < 0 and low > 0.0):
             return True
-    whole = natural(machines, spans)
-    goals = outside_goals(whole)
-    if any(goal(whole).value > 0 for goal in goals):
-        return True
-    slopes, _ = graded(machines, spans)
+    slopes, middle = graded(machines, spans)
+    # only a margin that is < 0 in the middle can be so everywhere
+    goals = [goal for goal in outside_goals(slopes) if not goal(middle).value <= 0]
     return any(positive(goal, slopes, machines, spans) for goal in goals)
 
 

@@ -78,7 +78,7 @@ def _singularity_distance(name: str) -> Rule:
     def needs(least: float, _: Mapping[str, Any]) -> list[Need]:
         far = Need(
             f"locus {name} with distance {least}",
-            lambda s: isinstance(s, Locus) and s.name == name and s.distance >= least > 0.0,
+            lambda s: isinstance(s, Locus) and s.name == name and s.distance >= least,
         )
         return [reach(0.0), far]
 

@@ -15,6 +15,8 @@ from flint import arb
 from tpm_design.checker.balls import (
     Enclosure,
     Symmetric,
+    Triple,
+    chained,
     constant,
     cross,
     determinant,
@@ -26,18 +28,20 @@ from tpm_design.checker.spectrum import singular_pairs
 from tpm_design.checker.uru import LIMBS, Configuration, Velocity
 
 Goal = Callable[[Configuration], Enclosure]
-SymmetricGoal = Callable[[Configuration], Symmetric]
+SymmetricGoals = Callable[[Configuration], Sequence[Symmetric]]
 
 
 class Goals(NamedTuple):
     """Quantities that are > 0 and symmetric matrices of which all eigenvalues are > 0."""
 
     quantities: Sequence[Goal] = ()
-    matrices: Sequence[SymmetricGoal] = ()
+    matrices: SymmetricGoals | None = None
 
 
 DETERMINANTS = ("translation", "actuation", "rotation")
 NINE = arb(9)
+NEARLY_EQUAL = 1.02
+"""Ratio of squared singular values."""
 
 
 @dataclass(frozen=True)
@@ -139,11 +143,24 @@ def gram(velocity: Velocity) -> Symmetric:
 
 def squared_less_gram(velocity: Velocity, scale: Enclosure) -> Symmetric:
     """B² − scale · A Aᵀ."""
-    (p, q, r), (u, v, w) = gram(velocity)
+    return difference(squared(velocity), multiple(gram(velocity), scale))
+
+
+def squared(velocity: Velocity) -> Triple:
+    """The diagonal of B²."""
     b1, b2, b3 = (square(entry) for entry in velocity.b)
-    return Symmetric(
-        (b1 - scale * p, b2 - scale * q, b3 - scale * r), (-(scale * u), -(scale * v), -(scale * w))
-    )
+    return b1, b2, b3
+
+
+def multiple(matrix: Symmetric, scale: Enclosure) -> Symmetric:
+    (p, q, r), (u, v, w) = matrix
+    return Symmetric((p * scale, q * scale, r * scale), (u * scale, v * scale, w * scale))
+
+
+def difference(diagonal: Triple, matrix: Symmetric) -> Symmetric:
+    """A diagonal matrix less another."""
+    (d, e, f), (p, q, r), (u, v, w) = diagonal, *matrix
+    return Symmetric((d - p, e - q, f - r), (-u, -v, -w))
 
 
 def negative(matrix: Symmetric) -> Symmetric:
@@ -160,7 +177,7 @@ class Slowest:
 
     def goals(self, _: Configuration) -> Goals:
         scale = constant(arb(self.floor) ** 2)
-        return Goals(matrices=[lambda at: squared_less_gram(at.velocity(self.drive), scale)])
+        return Goals(matrices=lambda at: [squared_less_gram(at.velocity(self.drive), scale)])
 
 
 @dataclass(frozen=True)
@@ -172,7 +189,7 @@ class Fastest:
 
     def goals(self, _: Configuration) -> Goals:
         scale = constant(arb(self.ceiling) ** 2)
-        return Goals(matrices=[lambda at: negative(squared_less_gram(at.velocity(self.drive), scale))])
+        return Goals(matrices=lambda at: [negative(squared_less_gram(at.velocity(self.drive), scale))])
 
 
 @dataclass(frozen=True)
@@ -184,10 +201,12 @@ class Scale:
     slope: Mapping[str, arb]
 
     def at(self, configuration: Configuration) -> Enclosure:
-        value = constant(self.middle)
+        value, terms = self.middle, []
         for name, slope in self.slope.items():
-            value = value + (configuration.variables[name] - constant(self.centre[name])).times(slope)
-        return value
+            variable = configuration.variables[name]
+            value += (variable.value - self.centre[name]) * slope
+            terms.append((slope, variable))
+        return chained(value, terms)
 
 
 @dataclass(frozen=True)
@@ -205,13 +224,14 @@ class Condition:
         scale = self.scale(configuration)
         if scale is None:
             return Goals([lambda _: constant(arb(-1))])
-        least = arb(self.floor) ** 2
-        return Goals(
-            matrices=[
-                lambda at: negative(squared_less_gram(at.velocity(self.drive), scale.at(at))),
-                lambda at: squared_less_gram(at.velocity(self.drive), scale.at(at).times(least)),
-            ]
-        )
+        least = constant(arb(self.floor) ** 2)
+
+        def matrices(at: Configuration) -> list[Symmetric]:
+            velocity = at.velocity(self.drive)
+            driven, scaled = squared(velocity), multiple(gram(velocity), scale.at(at))
+            return [negative(difference(driven, scaled)), difference(driven, multiple(scaled, least))]
+
+        return Goals(matrices=matrices)
 
     def scale(self, configuration: Configuration) -> Scale | None:
         """With slopes where the configuration has them; None at a singularity, where there is no scale."""
@@ -219,7 +239,8 @@ class Condition:
         middle = [[float(entry.value) for entry in row] for row in rows]
         driven = [float(entry.value) for entry in b]
         try:
-            (least, *slow), _, (greatest, *fast) = singular_pairs(middle, driven)
+            pairs = singular_pairs(middle, driven)
+            least, greatest = pairs[0][0], pairs[2][0]
             # without a floor any scale above the greatest serves
             mean = math.sqrt(least * greatest) / (self.floor or 0.5 * math.sqrt(least / greatest))
         except (ZeroDivisionError, ValueError, OverflowError):
@@ -227,13 +248,17 @@ class Condition:
         if not (math.isfinite(mean) and mean > 0.0):
             return None
         slope: dict[str, float] = {}
-        for value, (u, w) in ((least, slow), (greatest, fast)):
-            share = 0.5 * mean / value
-            for i in LIMBS:
-                moved = -2.0 * share * value * u[i]
-                for entry, toward in zip(rows[i], w, strict=True):
-                    add_slopes(slope, entry, moved * toward)
-                add_slopes(slope, b[i], 2.0 * share * u[i] * u[i] * driven[i])
+        # nearly equal ones part in any direction: what they have in common is followed
+        lowest = [pair for pair in pairs if pair[0] <= least * NEARLY_EQUAL]
+        highest = [pair for pair in pairs if pair[0] * NEARLY_EQUAL >= greatest]
+        for group in (lowest, highest):
+            for value, u, w in group:
+                share = 0.5 * mean / (value * len(group))
+                for i in LIMBS:
+                    moved = -2.0 * share * value * u[i]
+                    for entry, toward in zip(rows[i], w, strict=True):
+                        add_slopes(slope, entry, moved * toward)
+                    add_slopes(slope, b[i], 2.0 * share * u[i] * u[i] * driven[i])
         finite = {name: arb(part) for name, part in slope.items() if math.isfinite(part)}
         centre = {name: configuration.variables[name].value.mid() for name in finite}
         return Scale(arb(mean), centre, finite)
@@ -272,15 +297,17 @@ class Sensitivity:
     def goals(self, _: Configuration) -> Goals:
         scale = arb(self.ceiling) ** 2
 
-        def matrix(at: Configuration) -> Symmetric:
+        def matrices(at: Configuration) -> list[Symmetric]:
             (p, q, r), (u, v, w) = gram(at.velocity(self.drive))
             c1, c2, c3 = (at.length_error_gain_squared(limb) for limb in LIMBS)
-            return Symmetric(
-                (p.times(scale) - c1, q.times(scale) - c2, r.times(scale) - c3),
-                (u.times(scale), v.times(scale), w.times(scale)),
-            )
+            return [
+                Symmetric(
+                    (p.times(scale) - c1, q.times(scale) - c2, r.times(scale) - c3),
+                    (u.times(scale), v.times(scale), w.times(scale)),
+                )
+            ]
 
-        return Goals(matrices=[matrix])
+        return Goals(matrices=matrices)
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from tpm_design.checker.balls import (
     direction,
     inverse,
     magnitude,
+    product,
     root,
     square,
     wide_square,
@@ -218,7 +219,7 @@ class Configuration:
         if name == "rotation":
             first, second, third = self.legs
             # |x|/β_2 · |y|/β_3 · |z|/β_1, each a component of an h_i
-            return (first.along_k * second.along_k * third.along_k).times(TWO)
+            return product(product(first.along_k, second.along_k), third.along_k).times(TWO)
         if name == "translation":
             return determinant(self._joint_velocity.rows)
         return determinant([self._unit_motor_row(limb) for limb in LIMBS])

@@ -164,7 +164,7 @@ def certify(
         Path | None,
         typer.Option(metavar="FILE", help="The certificate; in the run, or certificate.json, if left out."),
     ] = None,
-    workers: Annotated[int | None, typer.Option(help="Threads; one per processor if left out.")] = None,
+    workers: Annotated[int | None, typer.Option(help="One per processor if left out.")] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int | None:

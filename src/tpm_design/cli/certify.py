@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from tpm_design.certificates.document import FILE, document, write_document
 from tpm_design.certificates.tolerances import LargestTolerance, largest_tolerance
 from tpm_design.certificates.verdict import Requirement, Verdict, verdict
-from tpm_design.checker import check_certificate
+from tpm_design.checker import Progress, check_certificate
 from tpm_design.cli.commands import chosen_design, usable_processors
 from tpm_design.cli.guard import NOT_PROVED, complain
+from tpm_design.cli.progress import SECONDS_BETWEEN_LINES
 from tpm_design.cli.results import design_rows
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
@@ -38,19 +40,19 @@ def certify_one(
     as_json: bool,
     quiet: bool,
 ) -> int | None:
+    if workers is not None and workers < 1:
+        raise UsageError(
+            f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
+        )
     if check is not None:
         if path is not None or settings or max_tolerance or output is not None:
             raise UsageError(
                 "--check stands alone.", where="certify", remedy="Write `tpm-design certify --check FILE`."
             )
-        return _check(check, as_json=as_json)
+        return _check(check, workers or usable_processors(), as_json=as_json, quiet=quiet)
     if path is None:
         raise UsageError(
             "Nothing to certify.", where="certify", remedy="Name a study, a run folder, or --check FILE."
-        )
-    if workers is not None and workers < 1:
-        raise UsageError(
-            f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
         )
     study, design, assumptions = chosen_design(path, settings)
     if not study.problem.constraints:
@@ -227,8 +229,8 @@ def _largest_data(study: Study, asked_for: Certification, found: LargestToleranc
     }
 
 
-def _check(path: Path, *, as_json: bool) -> int | None:
-    found = check_certificate(path)
+def _check(path: Path, workers: int, *, as_json: bool, quiet: bool) -> int | None:
+    found = check_certificate(path, workers=workers, watch=_silent if as_json or quiet else _told_at_times())
     if as_json:
         print(
             json.dumps(
@@ -243,3 +245,22 @@ def _check(path: Path, *, as_json: bool) -> int | None:
         word = "Valid" if found.valid else "REJECTED"
         print(f"{word}: {found.leaves} boxes checked in {found.seconds:.3g} s.")
     return None if found.valid else NOT_PROVED
+
+
+def _silent(_: Progress) -> None:
+    """Tells nothing."""
+
+
+def _told_at_times() -> Callable[[Progress], None]:
+    """Tells the progress of a check, on standard error, every few seconds."""
+    began = last = time.monotonic()
+
+    def watch(progress: Progress) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= SECONDS_BETWEEN_LINES:
+            last = now
+            left = (now - began) * (progress.total - progress.done) / progress.done
+            complain(f"{progress.done} of {progress.total} boxes checked, some {left:.0f} s left")
+
+    return watch
