@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from tpm_design.certificates.demands import Demand, NoProofError, demands
+from tpm_design.certificates.demands import REACH, Demand, NoProofError, demands, refutable
 from tpm_design.certificates.settlement import Breaking, Outcome, Settlement, settle
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Design, Goal, Problem, design_context
@@ -16,7 +16,7 @@ from tpm_design.problem import Design, Goal, Problem, design_context
 @dataclass(frozen=True)
 class Requirement:
     """One constraint of the study. ``settlements``: numbers of what it needs, in ``Verdict.settlements``.
-    ``slack`` (SI): the proved one, of the demand that carries the bound; None unless proved."""
+    ``slack`` (SI): the proved one, the least of the demands that carry the bound; None unless proved."""
 
     goal: Goal
     outcome: Outcome
@@ -97,6 +97,9 @@ def worst_outcome(outcomes: list[Outcome]) -> Outcome:
 
 def _needs(goal: Goal, context: Context) -> tuple[Demand, ...] | str:
     kind = context.mechanism.kind
+    placed = context.region
+    if goal.metric.name == "coverage" and placed is not None and len(placed.points) > 1:
+        return "that separate poses lie in one aspect has no proof here"
     signs = [1.0] * len(kind.determinants)
     if context.region is not None:
         signs = [1.0 if low + high >= 0.0 else -1.0 for low, high in _ranges(context)]
@@ -115,10 +118,20 @@ def _requirement(goal: Goal, numbers: list[int], settlements: tuple[Settlement, 
     needed = [settlements[number] for number in numbers]
     outcome = worst_outcome([settlement.outcome for settlement in needed])
     if outcome == "proved":
-        return Requirement(goal, outcome, needed[-1].slack, tuple(numbers), None, "")
+        return Requirement(goal, outcome, _slack(needed), tuple(numbers), None, "")
     first = next(settlement for settlement in needed if settlement.outcome == outcome)
     reason = f"{_named(first.demand)}: {first.reason}"
+    if outcome == "refuted" and not refutable(goal):
+        reason = f"{reason}; how much of the region is left has no proof here"
+        return Requirement(goal, "undecided", None, tuple(numbers), None, reason)
     return Requirement(goal, outcome, None, tuple(numbers), first.breaking, reason)
+
+
+def _slack(needed: list[Settlement]) -> float:
+    """The least of those demands that carry the bound: one, or one for each margin."""
+    bound = needed[-1].demand.bound
+    carrying = [s.slack for s in needed if s.demand != REACH and s.demand.bound == bound]
+    return min(carrying, default=needed[-1].slack)
 
 
 def _named(demand: Demand) -> str:

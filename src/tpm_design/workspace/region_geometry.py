@@ -185,3 +185,14 @@ def _signed_distance_at(region, x, y, z):  # type: ignore[no-untyped-def]
 def signed_distance_at(region: PlacedRegion, pose: tuple[float, float, float]) -> float:
     """Distance (m) of one pose to the region's surface, negative inside."""
     return float(_signed_distance_at(region, *pose))
+
+
+@kernel
+def _nearest_at(region, x, y, z):  # type: ignore[no-untyped-def]
+    return nearest(region, x, y, z)
+
+
+def nearest_at(region: PlacedRegion, pose: tuple[float, float, float]) -> tuple[float, float, float]:
+    """The region's point (m) nearest to one pose; the pose itself inside."""
+    x, y, z = _nearest_at(region, *pose)
+    return float(x), float(y), float(z)
