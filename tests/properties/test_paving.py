@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -149,6 +151,31 @@ def test_shares_in_closed_form() -> None:
         lower, upper = share_at(level, *slopes)
         assert lower <= exact <= upper
         assert upper - lower <= 1e-10
+
+
+def exact_share(level: float, slopes: NDArray[np.float64]) -> Fraction:
+    """Σ ± (a − sums of the slopes)₊ⁿ over n! times their product, in fractions."""
+    steep = [2 * Fraction(slope) for slope in slopes.tolist() if slope > 0.0]
+    start = sum(steep) / 2 - Fraction(level)
+    total = Fraction(0)
+    for count in range(len(steep) + 1):
+        for chosen in itertools.combinations(steep, count):
+            total += (-1) ** count * max(Fraction(0), start - sum(chosen)) ** len(steep)
+    return total / (math.factorial(len(steep)) * math.prod(steep))
+
+
+def test_shares_hold_the_exact_one() -> None:
+    """Slopes of any size and ratio, planes through corners among them."""
+    random = np.random.default_rng(6)
+    for _ in range(3000):
+        slopes = 10.0 ** random.uniform(-9.0, 0.0, 3) * 10.0 ** random.choice(
+            [0, -8, 8, -100, 120, -250, 250]
+        )
+        slopes[random.integers(3)] *= random.choice([0.0, 1.0])
+        corner = random.random() < 0.2
+        level = float((random.choice([-1.0, 1.0], 3) if corner else random.uniform(-1.0, 1.0, 3)) @ slopes)
+        lower, upper = share_at(level, *slopes)
+        assert lower <= exact_share(level, slopes) <= upper
 
 
 def test_waves_take_the_largest_gaps() -> None:

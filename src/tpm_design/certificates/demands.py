@@ -150,6 +150,11 @@ def demands(goal: Goal, kind: MechanismKind, signs: Sequence[float]) -> tuple[De
     raise NoProofError(f"{name} has no proof by intervals here")
 
 
+def refutable(goal: Goal) -> bool:
+    """Whether a demand that fails breaks the requirement: a share of the region below 1 leaves some out."""
+    return goal.metric.name != "coverage" or (goal.minimum is not None and goal.minimum >= 1.0)
+
+
 def _bound(goal: Goal) -> tuple[float, bool]:
     """The bound of a constraint and whether it is a ceiling."""
     if goal.minimum is not None and goal.maximum is not None:
@@ -163,4 +168,9 @@ def _bound(goal: Goal) -> tuple[float, bool]:
         if wanted < 0.0:
             raise NoProofError("a bound below 0 has no proof here: ask for 0 or more")
     bound = goal.minimum if goal.minimum is not None else goal.maximum
+    if bound is not None and bound < 0.0:
+        # statements square their bounds, and a region has no surroundings of negative width
+        raise NoProofError("a bound below 0 has no proof here")
+    if goal.metric.name == "coverage" and bound is not None and bound > 1.0:
+        raise NoProofError("coverage is never more than 1")
     return float(bound if bound is not None else 0.0), goal.maximum is not None

@@ -15,7 +15,7 @@ from tpm_design.metrics.context import Context
 from tpm_design.problem import Problem
 from tpm_design.workspace.covers import Cover, Proof, prove
 from tpm_design.workspace.refutation import fails_at, singular_near
-from tpm_design.workspace.region_geometry import place, signed_distance_at
+from tpm_design.workspace.region_geometry import nearest_pose, place
 from tpm_design.workspace.regions import Points
 
 Outcome = Literal["proved", "refuted", "undecided"]
@@ -72,7 +72,7 @@ def settle(
     worst = worst_machine(problem, demand, context, tolerance)
     undecided = Settlement(demand, "undecided", demand.bound, (), None, "", 0, worst.slack, _breaking(worst))
     if demand.kind == "length":
-        return _settled_length(undecided, context.mechanism, tolerance)
+        return _settled_length(undecided, worst.mechanism, context.mechanism, tolerance)
     breaking = _refuted_at(demand, context, worst.mechanism, worst.pose) if worst.slack < 0.0 else None
     if breaking is not None:
         return replace(undecided, outcome="refuted", breaking=breaking, reason="a pose breaks it")
@@ -141,10 +141,8 @@ def _refuted_at(demand: Demand, context: Context, mechanism: Mechanism, pose: Po
     here = (at[0], at[1], at[2])
     if demand.kind == "locus":
         part = mechanism.kind.determinants.index(demand.name)
-        singular = singular_near(mechanism, context.mode, part, here)
-        if singular is None or signed_distance_at(context.placed, singular) >= demand.bound:
-            return None
-        return Breaking(singular, mechanism.parameters)
+        singular = singular_near(mechanism, context.mode, part, here, context.placed, demand.bound)
+        return None if singular is None else Breaking(singular, mechanism.parameters)
     statement = demand.statement(demand.bound, mechanism.kind)
     return (
         Breaking(here, mechanism.parameters) if fails_at(statement, mechanism, context.mode, here) else None
@@ -158,7 +156,8 @@ def _broken_in(
     if proof.open_box is None or proof.ending != "small" or demand.kind == "locus":
         return None
     middle = proof.open_box.mean(axis=1)
-    pose = (float(middle[0]), float(middle[1]), float(middle[2]))
+    # the middle of a box on a rounded face may be outside
+    pose = nearest_pose(context.placed, (float(middle[0]), float(middle[1]), float(middle[2])))
     free = limb_tolerances(problem.kind, tolerance)
     machine: Mechanism | None = context.mechanism
     if any(map(any, free.values())):
@@ -167,16 +166,22 @@ def _broken_in(
 
 
 def _settled_length(
-    undecided: Settlement, mechanism: Mechanism, tolerance: Mapping[str, float]
+    undecided: Settlement, worst: Mechanism, mechanism: Mechanism, tolerance: Mapping[str, float]
 ) -> Settlement:
     demand = undecided.demand
     total = mechanism.enclosed_link_length(tolerance)
     level = total.hi if demand.ceiling else total.lo
     if demand.sense * (level - demand.bound) >= 0.0:
         return replace(undecided, outcome="proved", level=level)
-    if undecided.found < 0.0:
+    if undecided.found < 0.0 and _too_long_or_short(demand, worst):
         return replace(undecided, outcome="refuted", breaking=undecided.worst, reason="a machine breaks it")
     return replace(undecided, reason="the bound is attained to rounding")
+
+
+def _too_long_or_short(demand: Demand, machine: Mechanism) -> bool:
+    """Whether one machine is proved to break the bound: sums of lengths are rounded."""
+    total = machine.enclosed_link_length({})
+    return total.lo > demand.bound if demand.ceiling else total.hi < demand.bound
 
 
 def _breaking(worst: Worst) -> Breaking:

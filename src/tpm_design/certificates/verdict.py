@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from tpm_design.certificates.demands import Demand, NoProofError, demands
+from tpm_design.certificates.demands import REACH, Demand, NoProofError, demands, refutable
 from tpm_design.certificates.settlement import Breaking, Outcome, Settlement, settle
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Design, Goal, Problem, design_context
@@ -16,9 +16,10 @@ from tpm_design.problem import Design, Goal, Problem, design_context
 @dataclass(frozen=True)
 class Requirement:
     """One constraint of the study. ``settlements``: numbers of what it needs, in ``Verdict.settlements``.
-    ``slack`` (SI): the proved one; None unless proved. ``worst``: the worst value (SI) that a search found
-    over the region and the machines within tolerance, so that the true one lies between what is proved and
-    it; None where the requirement is not on one value, infinite where there is no locus."""
+    ``slack`` (SI): the proved one, the least of the demands that carry the bound; None unless proved.
+    ``worst``: the worst value (SI) that a search found over the region and the machines within tolerance, so
+    that the true one lies between what is proved and it; None where the requirement is not on one value,
+    infinite where there is no locus."""
 
     goal: Goal
     outcome: Outcome
@@ -100,10 +101,11 @@ def worst_outcome(outcomes: list[Outcome]) -> Outcome:
 
 def _needs(goal: Goal, context: Context) -> tuple[Demand, ...] | str:
     kind = context.mechanism.kind
+    placed = context.region
+    if goal.metric.name == "coverage" and placed is not None and len(placed.points) > 1:
+        return "that separate poses lie in one aspect has no proof here"
     signs = [1.0] * len(kind.determinants)
     if context.region is not None:
-        if goal.metric.name == "coverage" and len(context.region.points) > 1:
-            return "no proof here that separate poses lie in one aspect"
         signs = [1.0 if low + high >= 0.0 else -1.0 for low, high in _ranges(context)]
     try:
         return demands(goal, kind, signs)
@@ -125,19 +127,17 @@ def _requirement(goal: Goal, numbers: list[int], settlements: tuple[Settlement, 
         return Requirement(goal, outcome, _slack(needed), tuple(numbers), None, "", worst)
     first = next(settlement for settlement in needed if settlement.outcome == outcome)
     reason = f"{_named(first.demand)}: {first.reason}"
-    if outcome == "refuted" and goal.metric.name == "coverage" and (goal.minimum or 0.0) < 1.0:
-        reason = f"{reason}, which says nothing of a share below 1"
+    if outcome == "refuted" and not refutable(goal):
+        reason = f"{reason}; how much of the region is left has no proof here"
         return Requirement(goal, "undecided", None, tuple(numbers), None, reason, worst)
     return Requirement(goal, outcome, None, tuple(numbers), first.breaking, reason, worst)
 
 
 def _slack(needed: list[Settlement]) -> float:
-    """The slack of the demand that carries the bound, the last one; of several dimensionless margins the
-    least."""
-    margins = ("determinant", "serial")
-    if needed[-1].demand.kind not in margins:
-        return needed[-1].slack
-    return min(settlement.slack for settlement in needed if settlement.demand.kind in margins)
+    """The least of those demands that carry the bound: one, or one for each margin."""
+    bound = needed[-1].demand.bound
+    carrying = [s.slack for s in needed if s.demand != REACH and s.demand.bound == bound]
+    return min(carrying, default=needed[-1].slack)
 
 
 def _named(demand: Demand) -> str:

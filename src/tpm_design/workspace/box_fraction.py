@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 from tpm_design.arithmetic import inner
 
 # of the largest; flatter slopes would cost digits below
 FLATTEST = 1e-4
 # relative to the products that are summed: more than their rounding
 ROUNDING = 1e-13
+# beyond them, cubes of slopes underflow or overflow
+SMALLEST_CUBED, LARGEST_CUBED = 1e-80, 1e80
 
 
 @inner
@@ -50,7 +54,17 @@ def share_below(level, first, second, third):  # type: ignore[no-untyped-def]
     The part Σ n_i w_i < a of the unit cube is Σ ± (a − sums of n_i)₊³/(6 n₁n₂n₃), over all subsets of the
     n_i. Slopes that are too flat go into the level instead.
     """
+    total = first + second + third
+    if level > 2.0 * total:
+        return 0.0, 0.0
+    if level < -2.0 * total:
+        return 1.0, 1.0
     largest = max(first, second, third)
+    if not SMALLEST_CUBED < largest < LARGEST_CUBED:
+        _, exponent = math.frexp(largest)
+        level, first = math.ldexp(level, -exponent), math.ldexp(first, -exponent)
+        second, third = math.ldexp(second, -exponent), math.ldexp(third, -exponent)
+        largest = max(first, second, third)
     p, q, r, flat = 0.0, 0.0, 0.0, 0.0
     count = 0
     for slope in (first, second, third):

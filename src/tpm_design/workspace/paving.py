@@ -25,8 +25,8 @@ IntArray = NDArray[np.int64]
 WAVE_SHARE = 0.5
 TAKEN = 0.6
 LEAST_WAVE_SHARE = 0.05
-# of the volume of all charts: more than the rounding of every sum of volumes
-SUM_ROUNDING = 1e-13
+# relative, for each of the boxes: more than the rounding of a sum of their volumes in any order
+SUM_ROUNDING = 2.0**-52
 BLOCK = 4096
 
 
@@ -152,7 +152,7 @@ class Paving:
     @property
     def sum_rounding(self) -> float:
         """More (m³) than the rounding of any sum of the boxes' volumes."""
-        return SUM_ROUNDING * self.extent * len(self.roots)
+        return SUM_ROUNDING * self.boxes * self.extent * len(self.roots)
 
     @property
     def gap(self) -> float:

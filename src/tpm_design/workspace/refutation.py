@@ -8,6 +8,7 @@ from tpm_design.arithmetic import Interval, inner, kernel
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace import statements
+from tpm_design.workspace.region_geometry import PlacedRegion, signed_distance_at
 
 Pose = tuple[float, float, float]
 
@@ -68,15 +69,20 @@ def fails_at(statement: Any, mechanism: Mechanism, mode: Mode, pose: Pose) -> bo
     return any(negative)
 
 
-def singular_near(mechanism: Mechanism, mode: Mode, part: int, pose: Pose) -> Pose | None:
-    """A pose within reach, ``pose`` or very near, where determinant ``part`` is proved to be zero (to 1e-12),
-    or within 1e-5 of the reach radius of which it is proved to change its sign within reach; else None."""
+def singular_near(
+    mechanism: Mechanism, mode: Mode, part: int, pose: Pose, region: PlacedRegion, distance: float
+) -> Pose | None:
+    """A pose within reach and nearer than ``distance`` (m) to the region, ``pose`` or very near, where
+    determinant ``part`` is proved to be zero (to 1e-12), or within 1e-5 of the reach radius of which it is
+    proved to change its sign within reach and that distance; else None."""
     geometry = mechanism.enclosed_geometry({})
     radius = mechanism.reach_radius()
     snapped = tuple(0.0 if abs(value) < 1e-9 * radius else float(value) for value in pose)
     at = (snapped[0], snapped[1], snapped[2])
     degenerate = tuple((value, value) for value in at)
-    if _sign_at(geometry, mode.signs, part, *at) == 2 and _box_within_reach(geometry, mode.signs, degenerate):
+    zero = _sign_at(geometry, mode.signs, part, *at) == 2
+    within = signed_distance_at(region, at) < distance
+    if zero and within and _box_within_reach(geometry, mode.signs, degenerate):
         return at
     x, y, z = map(float, pose)
     for share in SEGMENTS:
@@ -84,6 +90,9 @@ def singular_near(mechanism: Mechanism, mode: Mode, part: int, pose: Pose) -> Po
         for dx, dy, dz in _directions(mechanism, mode, part, (x, y, z), half):
             first = (x + dx, y + dy, z + dz)
             second = (x - dx, y - dy, z - dz)
+            # the distance to a convex region is greatest at an end
+            if not all(signed_distance_at(region, end) < distance for end in (first, second)):
+                continue
             signs = [_sign_at(geometry, mode.signs, part, *end) for end in (first, second)]
             hull = tuple((min(u, v), max(u, v)) for u, v in zip(first, second, strict=True))
             if sorted(signs) == [-1, 1] and _box_within_reach(geometry, mode.signs, hull):
