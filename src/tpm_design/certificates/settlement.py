@@ -78,9 +78,9 @@ def settle(
         return replace(undecided, outcome="refuted", breaking=breaking, reason="a pose breaks it")
     proof: Proof | None = None
     used = 0
-    for level in _levels(demand, worst, with_slack=with_slack):
-        if level != demand.bound and not _provable_at_worst(demand, level, context, tolerance, worst):
-            continue
+    *ambitious, least = _levels(demand, worst, with_slack=with_slack)
+    hopeful = [level for level in ambitious if _provable_at_worst(demand, level, context, tolerance, worst)]
+    for level in (*hopeful, least):
         proof = _proof(demand, level, context, tolerance, boxes)
         used += proof.boxes
         if proof.proved:
