@@ -81,6 +81,7 @@ def statement_data(settlement: Settlement) -> dict[str, Any]:
     return settlement.demand.data(settlement.level) | {
         "outcome": settlement.outcome,
         "reason": settlement.reason,
+        "open_box": None if settlement.open_box is None else [list(side) for side in settlement.open_box],
         "covers": covers,
     }
 

@@ -40,7 +40,7 @@ class Breaking:
 class Settlement:
     """``level`` (SI): what was proved, at least (at most) the demand's bound; ``covers``: its proof.
     ``boxes``: how many were looked at in all. ``found``: the least slack that a search found (SI), and
-    ``worst``: where."""
+    ``worst``: where. ``open_box``: sides (m) of a box of poses on which an undecided demand is not proved."""
 
     demand: Demand
     outcome: Outcome
@@ -51,6 +51,7 @@ class Settlement:
     boxes: int
     found: float
     worst: Breaking
+    open_box: tuple[tuple[float, float], ...] | None = None
 
     @property
     def slack(self) -> float:
@@ -89,7 +90,9 @@ def settle(
     breaking = _broken_in(problem, demand, context, tolerance, proof)
     if breaking is not None:
         return replace(undecided, outcome="refuted", breaking=breaking, reason="a pose breaks it", boxes=used)
-    return replace(undecided, reason=_reason(demand, worst, proof, boxes), boxes=used)
+    sides = None if proof.open_box is None else tuple((float(lo), float(hi)) for lo, hi in proof.open_box)
+    reason = _reason(demand, worst, proof, boxes)
+    return replace(undecided, reason=reason, boxes=used, open_box=sides)
 
 
 def _levels(demand: Demand, worst: Worst, *, with_slack: bool) -> list[float]:

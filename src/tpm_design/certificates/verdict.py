@@ -12,6 +12,8 @@ from tpm_design.certificates.settlement import Breaking, Outcome, Settlement, se
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Design, Goal, Problem, design_context
 
+Box = tuple[tuple[float, float], ...]
+
 
 @dataclass(frozen=True)
 class Requirement:
@@ -19,7 +21,8 @@ class Requirement:
     ``slack`` (SI): the proved one, the least of the demands that carry the bound; None unless proved.
     ``worst``: the worst value (SI) that a search found over the region and the machines within tolerance, so
     that the true one lies between what is proved and it; None where the requirement is not on one value,
-    infinite where there is no locus."""
+    infinite where there is no locus. ``open_box``: sides (m) of a box of poses where the proof of an
+    undecided one failed."""
 
     goal: Goal
     outcome: Outcome
@@ -28,6 +31,7 @@ class Requirement:
     breaking: Breaking | None
     reason: str
     worst: float | None = None
+    open_box: Box | None = None
 
 
 @dataclass(frozen=True)
@@ -130,7 +134,7 @@ def _requirement(goal: Goal, numbers: list[int], settlements: tuple[Settlement, 
     if outcome == "refuted" and not refutable(goal):
         reason = f"{reason}; how much of the region is left has no proof here"
         return Requirement(goal, "undecided", None, tuple(numbers), None, reason, worst)
-    return Requirement(goal, outcome, None, tuple(numbers), first.breaking, reason, worst)
+    return Requirement(goal, outcome, None, tuple(numbers), first.breaking, reason, worst, first.open_box)
 
 
 def _slack(needed: list[Settlement]) -> float:

@@ -92,7 +92,8 @@ def verdict_text(study: Study, found: Verdict) -> str:
     effort = f"{found.boxes} boxes, {found.seconds:.2g} s"
     sentences = {
         "proved": f"Proved {_scope(study, found)} ({effort}).",
-        "refuted": f"Refuted: at least one requirement is broken {_scope(study, found)} ({effort}).",
+        "refuted": f"Refuted: a pose and a machine break a requirement. Asked was a proof {_scope(study, found)} "
+        f"({effort}).",
         "undecided": f"Not proved {_scope(study, found)} ({effort}).",
     }
     return f"{table(heads, rows)}\n\n{sentences[found.outcome]}"
@@ -124,6 +125,9 @@ def _requirement_row(study: Study, requirement: Requirement) -> list[str]:
     why = requirement.reason
     if requirement.breaking is not None and requirement.breaking.pose is not None:
         why = f"broken at {lengths_text(requirement.breaking.pose, study.units)}: {why}"
+    if requirement.open_box is not None:
+        middle = [0.5 * (low + high) for low, high in requirement.open_box]
+        why = f"not proved around {lengths_text(middle, study.units)}: {why}"
     return [
         goal.label,
         asked(goal, study.units, unit),
