@@ -92,8 +92,7 @@ def verdict_text(study: Study, found: Verdict) -> str:
     effort = f"{found.boxes} boxes, {found.seconds:.2g} s"
     sentences = {
         "proved": f"Proved {_scope(study, found)} ({effort}).",
-        "refuted": f"Refuted: a pose and a machine break a requirement. Asked was a proof {_scope(study, found)} "
-        f"({effort}).",
+        "refuted": f"Refuted. Asked was a proof {_scope(study, found)} ({effort}).",
         "undecided": f"Not proved {_scope(study, found)} ({effort}).",
     }
     return f"{table(heads, rows)}\n\n{sentences[found.outcome]}"
