@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+from tpm_design.arithmetic.rounding import check_rounding
 from tpm_design.certificates.demands import REACH, Demand, NoProofError, demands, refutable
 from tpm_design.certificates.settlement import Breaking, Outcome, Settlement, settle
 from tpm_design.metrics.context import Context
@@ -67,6 +68,7 @@ def verdict(
     Raises ParameterError where the design cannot be built.
     """
     began = time.perf_counter()
+    check_rounding()
     context = design_context(problem, design)
     needs = [_needs(goal, context) for goal in problem.constraints]
     # each statement once, however many requirements need it

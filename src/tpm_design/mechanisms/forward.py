@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.arithmetic import Interval, inner, kernel, variables
+from tpm_design.arithmetic.rounding import check_rounding
 from tpm_design.errors import ParameterError
 from tpm_design.mechanisms import equations, pointwise
 from tpm_design.mechanisms.assembly import Assembly
@@ -241,6 +242,7 @@ def candidates(
 
     Raises ParameterError where zeros do not stand apart: a curve of them, or a cluster at a singularity.
     """
+    check_rounding()
     stack = np.empty((STACK, 3, 2))
     found = np.empty((CANDIDATE_LIMIT, 3, 2))
     unique = np.empty(CANDIDATE_LIMIT, dtype=np.bool_)

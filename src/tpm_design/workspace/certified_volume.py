@@ -14,6 +14,7 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from tpm_design.arithmetic.rounding import check_rounding
 from tpm_design.errors import ParameterError, did_you_mean
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.paved_components import largest_part
@@ -84,6 +85,7 @@ def certified_volume(
         if number < 1:
             raise ParameterError(f"{name} = {number!r} is not positive.")
     began = time.perf_counter()
+    check_rounding()
     limits = Limits(boxes, float("inf") if seconds is None else began + seconds)
     octants = mechanism.single_octants(mode)
     with _threads(threads) as executor:
