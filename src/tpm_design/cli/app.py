@@ -155,14 +155,21 @@ def certify(
         typer.Option("--set", metavar="NAME=VALUE", help="Value in the study's units; may be repeated."),
     ] = None,
     max_tolerance: Annotated[
-        bool, typer.Option("--max-tolerance", help="Find the largest factor on the tolerances instead.")
+        bool,
+        typer.Option(
+            "--max-tolerance", help="Find the largest factor on the tolerances instead; writes no file."
+        ),
     ] = False,
     check: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Prove a certificate again, by other means.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Prove a certificate again, by other means; may take minutes."),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="The certificate; in the run, or certificate.json, if left out."),
+        typer.Option(
+            metavar="FILE",
+            help="The certificate; if left out, in the run, or ./certificate.json for a study or with --set.",
+        ),
     ] = None,
     workers: Annotated[int | None, typer.Option(help="One per processor if left out.")] = None,
     as_json: Json = False,

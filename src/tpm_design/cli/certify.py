@@ -92,7 +92,7 @@ def verdict_text(study: Study, found: Verdict) -> str:
     effort = f"{found.boxes} boxes, {found.seconds:.2g} s"
     sentences = {
         "proved": f"Proved {_scope(study, found)} ({effort}).",
-        "refuted": f"Refuted. Asked was a proof {_scope(study, found)} ({effort}).",
+        "refuted": f"Refuted: at least one requirement is broken by {_culprit(study, found)} ({effort}).",
         "undecided": f"Not proved {_scope(study, found)} ({effort}).",
     }
     return f"{table(heads, rows)}\n\n{sentences[found.outcome]}"
@@ -104,6 +104,13 @@ def _scope(study: Study, found: Verdict) -> str:
     if not tolerances:
         return f"{where}, for the exact dimensions"
     return f"{where}, for every machine within {tolerances} (each limb by itself, axis directions exact)"
+
+
+def _culprit(study: Study, found: Verdict) -> str:
+    tolerances = tolerance_text(study, found)
+    if not tolerances:
+        return "the exact dimensions"
+    return f"a machine within {tolerances} (each limb by itself, axis directions exact)"
 
 
 def tolerance_text(study: Study, found: Verdict, factor: float = 1.0) -> str:
@@ -178,7 +185,7 @@ def _largest(study: Study, design: Design, workers: int, *, as_json: bool, quiet
     if not any(bound > 0.0 for bound in asked_for.tolerance.values()):
         raise UsageError(
             "The study names no tolerances to scale.",
-            where="certify: tolerance:",
+            where="certify.tolerance",
             remedy="Add one, such as certify: {tolerance: {f: 0.1}}, ± in the study's units.",
         )
 
@@ -208,9 +215,11 @@ def _scaled(study: Study, asked_for: Certification, factor: float) -> dict[str, 
 
 def _largest_text(study: Study, asked_for: Certification, found: LargestTolerance) -> str:
     if found.factor == 0.0:
-        return "No tolerance can be proved; `certify` says what fails, or holds only just, without them."
+        return (
+            "No tolerance can be proved; `certify` without --max-tolerance names the requirement that fails."
+        )
     proved = ", ".join(
-        f"{name} ± {value:.4g} {unit}".rstrip()
+        f"{name} ± {value:.4g} {unit}".removesuffix(" -")
         for name, (value, unit) in _scaled(study, asked_for, found.factor).items()
     )
     limit = (

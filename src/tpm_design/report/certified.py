@@ -37,7 +37,11 @@ def certificate_lines(reported: Reported) -> list[str]:
         bound = text(asked(goal, reported.study.units, unit))
         rows.append([code_cell(goal.label), bound, text(str(one["outcome"])), spare, _why(reported, one)])
     headings = ["requirement", "asked", "outcome", "proved to spare", "why"]
-    sentence = f"{SENTENCES[str(data['outcome'])]}, {_machines(reported, data['tolerance'])}."
+    outcome = str(data["outcome"])
+    machines = _machines(reported, data["tolerance"])
+    sentence = f"{SENTENCES[outcome]}, {machines}."
+    if outcome == "refuted":
+        sentence = f"{SENTENCES[outcome]} by {machines.removeprefix('for ').replace('every', 'a', 1)}."
     lines = ["## What is proved", "", text(sentence), "", *table(headings, rows), ""]
     return [*lines, f"[{FILE}]({FILE}) can be checked again: {code(f'tpm-design certify --check {FILE}')}."]
 
