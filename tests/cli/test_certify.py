@@ -103,3 +103,18 @@ def test_a_study_without_constraints_has_nothing_to_prove(tmp_path: Path) -> Non
     done = tpm_design("certify", written(tmp_path, text))
     assert done.code == 2
     assert "no constraints" in done.errors
+
+
+def test_a_study_that_asks_for_no_proof_gets_a_certificate_that_checks(tmp_path: Path) -> None:
+    study = written(tmp_path, STUDY.replace("certify: {tolerance: {db: 0.1, f: 0.1, r: 0.1}}", ""))
+    target = tmp_path / "proof.json"
+    done = tpm_design("certify", study, "--output", target)
+    assert done.code == 0, done.errors
+    assert "for the exact dimensions" in done.output
+    assert tpm_design("certify", "--check", target, "--quiet").code == 0
+
+
+def test_a_folder_is_no_place_for_a_certificate(tmp_path: Path) -> None:
+    done = tpm_design("certify", written(tmp_path, STUDY), "--output", tmp_path)
+    assert done.code == 2
+    assert "needs a file name" in done.errors

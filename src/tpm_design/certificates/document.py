@@ -109,6 +109,10 @@ def _plain(value: Any) -> Any:
 
 def write_document(path: Path, data: Mapping[str, Any]) -> None:
     """Write a certificate, whole or not at all. Raises UsageError where it cannot be written."""
+    if not path.name or path.is_dir():
+        raise UsageError(
+            "The certificate needs a file name.", where=str(path), remedy="Write --output certificate.json."
+        )
     part = path.with_name(path.name + ".part")
     try:
         part.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -128,6 +128,10 @@ def _limits(mechanism: Fields, units: StudyUnits, machine: Machine) -> Iterator[
 
 
 def _tolerances(study: Fields, units: StudyUnits, machine: Machine) -> Iterator[str]:
+    if "certify" not in study.data:
+        if machine.tolerance:
+            yield "the study names no tolerances"
+        return
     given = study.fields("certify").fields("tolerance")
     if set(given.data) != set(machine.tolerance):
         yield "tolerance is not of the parameters the study names"
