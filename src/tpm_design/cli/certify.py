@@ -247,6 +247,7 @@ def _check(path: Path, workers: int, *, as_json: bool, quiet: bool) -> int | Non
         print(
             json.dumps(
                 {"certificate": str(path), "valid": found.valid, "faults": list(found.faults),
+                 "outcome": _claimed(path) if found.valid else None,
                  "leaves": found.leaves, "seconds": round(found.seconds, 3)},
                 ensure_ascii=False,
             )
@@ -255,8 +256,14 @@ def _check(path: Path, workers: int, *, as_json: bool, quiet: bool) -> int | Non
         for fault in found.faults:
             print(fault)
         word = "Valid" if found.valid else "REJECTED"
-        print(f"{word}: {found.leaves} boxes checked in {found.seconds:.3g} s.")
+        claim = f' It says "{_claimed(path)}".' if found.valid else ""
+        print(f"{word}: {found.leaves} boxes checked in {found.seconds:.3g} s.{claim}")
     return None if found.valid else NOT_PROVED
+
+
+def _claimed(path: Path) -> str:
+    """The outcome that a certificate states."""
+    return str(json.loads(path.read_text(encoding="utf-8"))["outcome"])
 
 
 def _silent(_: Progress) -> None:

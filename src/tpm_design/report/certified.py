@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from typing import Any
 
-from tpm_design.certificates.document import FILE
+from tpm_design.certificates.document import FILE, canonical
 from tpm_design.report.escape import code, code_cell, table, text
 from tpm_design.report.reported import Reported
 from tpm_design.report.words import asked, lengths_text
@@ -25,6 +26,8 @@ def certificate_lines(reported: Reported) -> list[str]:
     data = _certificate(reported)
     if data is None:
         return []
+    if not _unaltered(data):
+        return ["## What is proved", "", f"{FILE} was altered: nothing is claimed from it.", ""]
     rows = []
     stored = {str(one["label"]): one for one in data["requirements"]}
     for goal in reported.problem.constraints:
@@ -57,6 +60,12 @@ def _certificate(reported: Reported) -> Mapping[str, Any] | None:
     if not isinstance(data, dict) or data.get("design") != dict(reported.best.evaluation.design):
         return None
     return data
+
+
+def _unaltered(data: Mapping[str, Any]) -> bool:
+    """Whether the contents have the hash that they carry."""
+    contents = {name: value for name, value in data.items() if name != "sha256"}
+    return hashlib.sha256(canonical(contents)).hexdigest() == data.get("sha256")
 
 
 def _machines(reported: Reported, tolerance: Mapping[str, float]) -> str:
