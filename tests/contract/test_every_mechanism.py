@@ -7,7 +7,7 @@ import pytest
 
 from tpm_design.errors import ParameterError
 from tpm_design.mechanisms import MECHANISMS
-from tpm_design.mechanisms.base import MechanismKind
+from tpm_design.mechanisms.base import MechanismKind, Parameter
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 
 KINDS = list(MECHANISMS.values())
@@ -15,6 +15,12 @@ KINDS = list(MECHANISMS.values())
 
 def first_mode(mechanism: Mechanism) -> Mode:
     return mechanism.mode_of({field.name: "+" * field.length for field in mechanism.kind.mode_fields})
+
+
+def parameter_of(kind: MechanismKind, name: str) -> Parameter:
+    found = kind.parameter(name)
+    assert found is not None
+    return found
 
 
 def sample_poses(mechanism: Mechanism, mode: Mode, count: int) -> np.ndarray:
@@ -26,7 +32,11 @@ def sample_poses(mechanism: Mechanism, mode: Mode, count: int) -> np.ndarray:
     inside = margins["reach"] > 0.05 * radius
     for name in mechanism.kind.determinants:
         inside &= np.abs(np.nan_to_num(margins[name])) > 0.05
-    return poses[inside][:count]
+    poses = poses[inside]
+    for step in np.vstack([np.eye(3), -np.eye(3)]):
+        # off the ends of the joints' ranges as well
+        poses = poses[~np.isnan(mechanism.ik(poses + 0.01 * radius * step, mode)[:, 0])]
+    return poses[:count]
 
 
 @pytest.fixture(params=KINDS, ids=lambda kind: kind.name)
@@ -44,7 +54,8 @@ def test_every_field_of_the_documentation_is_filled(kind: MechanismKind) -> None
     assert kind.title
     assert kind.source
     assert kind.parameters
-    assert set(kind.example) == {parameter.name for parameter in kind.parameters}
+    needed = {parameter.name for parameter in kind.parameters if parameter.default is None}
+    assert needed <= set(kind.example) <= {parameter.name for parameter in kind.parameters}
     for thing in (*kind.parameters, *kind.mode_fields, *kind.limits):
         assert thing.description
     for singularity in kind.singularities:
@@ -101,8 +112,8 @@ def test_margins_keep_their_promises(machine: Mechanism) -> None:
 def test_scale_changes_lengths_and_nothing_else(kind: MechanismKind, machine: Mechanism) -> None:
     scaled = kind.build(
         {
-            parameter.name: kind.example[parameter.name] * (3.0 if parameter.dimension == "length" else 1.0)
-            for parameter in kind.parameters
+            name: value * (3.0 if parameter_of(kind, name).dimension == "length" else 1.0)
+            for name, value in kind.example.items()
         },
         {},
     )
@@ -127,6 +138,8 @@ def test_inverse_then_forward_comes_back(machine: Mechanism) -> None:
 
 def test_impossible_parameters_are_refused_in_words(kind: MechanismKind) -> None:
     for parameter in kind.parameters:
+        if parameter.default is not None:
+            continue
         missing = {name: value for name, value in kind.example.items() if name != parameter.name}
         with pytest.raises(ParameterError, match=parameter.name):
             kind.build(missing, {})

@@ -134,9 +134,17 @@ class Limits(Strict):
         return self
 
 
+def _limit_form(value: Any) -> str:
+    if isinstance(value, bool):
+        return "switch"
+    return "range" if isinstance(value, dict | BaseModel) else "number"
+
+
 LimitValue = Annotated[
-    Annotated[NonNegative, Tag("number")] | Annotated[Limits, Tag("range")],
-    Discriminator(lambda value: "range" if isinstance(value, dict | BaseModel) else "number"),
+    Annotated[NonNegative, Tag("number")]
+    | Annotated[Limits, Tag("range")]
+    | Annotated[Annotated[bool, Field(strict=True)], Tag("switch")],
+    Discriminator(_limit_form),
 ]
 
 ModeValue = Annotated[

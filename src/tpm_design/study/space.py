@@ -12,7 +12,7 @@ from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter
 from tpm_design.problem import Variable
 from tpm_design.study.document import Place
 from tpm_design.study.faults import Faults, shown
-from tpm_design.study.model import Center, LimitValue, MechanismModel, Quantity, Range
+from tpm_design.study.model import Center, Limits, LimitValue, MechanismModel, Quantity, Range
 from tpm_design.study.quantities import CENTER, meaning, read_quantity
 from tpm_design.units import Units, si_unit
 
@@ -53,6 +53,8 @@ def _check_given(parameter: Parameter, kind: MechanismKind, given: Mapping[str, 
             f"{name} sets all limbs and {single[0]} one of them",
             f"Keep {name}, or give {', '.join(limbs)} instead.",
         )
+    elif name not in given and not single and parameter.default is not None:
+        pass
     elif name not in given and len(single) < max(len(limbs), 1):
         missing = [limb for limb in limbs if limb not in single] if single else [name]
         faults.add(
@@ -62,10 +64,23 @@ def _check_given(parameter: Parameter, kind: MechanismKind, given: Mapping[str, 
         )
 
 
+_LIMIT_FORMS = {
+    "range": ("a range", "Write {min: …, max: …}."),
+    "number": ("one number", "Write it without min and max."),
+    "switch": ("a switch", "Write true or false."),
+}
+
+
+def _limit_form(value: LimitValue) -> str:
+    if isinstance(value, bool):
+        return "switch"
+    return "range" if isinstance(value, Limits) else "number"
+
+
 def read_limits(
     given: Mapping[str, LimitValue], kind: MechanismKind, units: Units, faults: Faults
 ) -> dict[str, Any]:
-    """Limits by name: (lowest, highest) or one number, SI."""
+    """Limits by name: (lowest, highest), one number or a switch, SI."""
     declared = {limit.name: limit for limit in kind.limits}
     for name in given:
         if name not in declared:
@@ -76,17 +91,13 @@ def read_limits(
         if name not in given:
             continue
         value, unit = given[name], si_unit(limit.dimension)
-        if limit.kind == "range":
-            if isinstance(value, float):
-                faults.add(("mechanism", "limits", name), f"{name} is a range", "Write {min: …, max: …}.")
-            else:
-                found[name] = (units.to_si(value.min, unit), units.to_si(value.max, unit))
-        elif isinstance(value, float):
-            found[name] = units.to_si(value, unit)
+        if _limit_form(value) != limit.kind:
+            what, remedy = _LIMIT_FORMS[limit.kind]
+            faults.add(("mechanism", "limits", name), f"{name} is {what}", remedy)
+        elif isinstance(value, Limits):
+            found[name] = (units.to_si(value.min, unit), units.to_si(value.max, unit))
         else:
-            faults.add(
-                ("mechanism", "limits", name), f"{name} is one number", "Write it without min and max."
-            )
+            found[name] = value if isinstance(value, bool) else units.to_si(value, unit)
     return found
 
 
