@@ -10,7 +10,10 @@ from tpm_design.mechanisms import MECHANISMS
 from tpm_design.mechanisms.base import MechanismKind, Parameter
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 
-KINDS = list(MECHANISMS.values())
+# the kernels of one mechanism are compiled by one worker
+KINDS = [
+    pytest.param(kind, id=kind.name, marks=pytest.mark.xdist_group(kind.name)) for kind in MECHANISMS.values()
+]
 
 
 def first_mode(mechanism: Mechanism) -> Mode:
@@ -39,7 +42,7 @@ def sample_poses(mechanism: Mechanism, mode: Mode, count: int) -> np.ndarray:
     return poses[:count]
 
 
-@pytest.fixture(params=KINDS, ids=lambda kind: kind.name)
+@pytest.fixture(params=KINDS)
 def kind(request: pytest.FixtureRequest) -> MechanismKind:
     found: MechanismKind = request.param
     return found
