@@ -38,6 +38,7 @@ from tpm_design.mechanisms import equations, forward
 from tpm_design.mechanisms.angles import NEXT_AXIS
 from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
+from tpm_design.mechanisms.joint_limits import enclosed_range, joint_range, range_numbers
 from tpm_design.mechanisms.mechanism import FloatArray, Mechanism, Mode
 from tpm_design.mechanisms.parameters import enclosed_values, limb_values, span, three_numbers
 from tpm_design.mechanisms.symmetry import IDENTITY, SignedPermutation, mode_orbits, symmetries
@@ -485,19 +486,6 @@ def shaft_possible(angle: float, gear: float) -> bool:
     return min(ends) - math.pi <= angle <= max(ends) + math.pi
 
 
-FULL_TURN = (-math.pi, math.pi)
-# a bound on a cosine that every angle is above
-NO_LIMIT = -2.0
-
-
-def limit_enclosure(low: float, high: float) -> tuple[Interval, Interval, Interval]:
-    """Cosine and sine of the middle of a joint's range and cosine of its half width, each enclosed."""
-    middle = 0.5 * (Interval(low, low) + high)
-    half = 0.5 * (Interval(high, high) - low)
-    half = Interval(min(math.pi, half.lo), min(math.pi, half.hi))
-    return cosine(middle), sine(middle), cosine(half)
-
-
 @dataclass(frozen=True)
 class Uru(Mechanism):
     """A LaMaViP 3-URU with dimensions. Pose: (x, y, z) of the platform's point P."""
@@ -527,20 +515,16 @@ class Uru(Mechanism):
 
     def enclosed_geometry(self, tolerance: Mapping[str, float]) -> Any:
         held = enclosed_values(self.kind, self.parameters, tolerance)
-        ranges = [limit_enclosure(*(FULL_TURN if r is None else r)) for r in self.joint_ranges]
-        limit_bounds = [
-            Interval(NO_LIMIT, NO_LIMIT) if joint is None else bound
-            for joint, (_, _, bound) in zip(self.joint_ranges, ranges, strict=True)
-        ]
+        middles, across, bounds = zip(*map(enclosed_range, self.joint_ranges), strict=True)
         intervals: dict[str, Any] = {
             "base": held["db"],
             "platform": held["dp"],
             "proximal": held["f"],
             "distal": held["r"],
             "gear": held["k"],
-            "limit_cosine": tuple(middle for middle, _, _ in ranges),
-            "limit_sine": tuple(middle for _, middle, _ in ranges),
-            "limit_bound": tuple(limit_bounds),
+            "limit_cosine": middles,
+            "limit_sine": across,
+            "limit_bound": bounds,
         }
         return self.geometry._replace(**intervals)
 
@@ -578,23 +562,18 @@ class Uru(Mechanism):
 def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str, Any]) -> Uru:
     """A 3-URU from SI values: db, dp, f, r (m), k, each one number or three; limits as declared."""
     values = limb_values(KIND, parameters)
-    ranges = [limits.get(f"theta{joint}") for joint in (1, 2, 3, 4)]
-    joint_ranges = tuple(None if r is None else (float(r[0]), float(r[1])) for r in ranges)
-    spans = [FULL_TURN if r is None else r for r in joint_ranges]
-    middles = [0.5 * (low + high) for low, high in spans]
-    halves = [min(math.pi, 0.5 * (high - low)) for low, high in spans]
+    joint_ranges = tuple(joint_range(limits, f"theta{joint}") for joint in (1, 2, 3, 4))
+    middles, across, bounds = zip(*map(range_numbers, joint_ranges), strict=True)
     geometry = UruGeometry(
         base=values["db"],
         platform=values["dp"],
         proximal=values["f"],
         distal=values["r"],
         gear=values["k"],
-        limited=0.0 if all(r is None for r in ranges) else 1.0,
-        limit_cosine=tuple(math.cos(m) for m in middles),
-        limit_sine=tuple(math.sin(m) for m in middles),
-        limit_bound=tuple(
-            NO_LIMIT if r is None else math.cos(h) for r, h in zip(joint_ranges, halves, strict=True)
-        ),
+        limited=0.0 if all(joint is None for joint in joint_ranges) else 1.0,
+        limit_cosine=middles,
+        limit_sine=across,
+        limit_bound=bounds,
         link_radius=float(limits.get("link_radius", 0.0)),
     )
     return Uru(kind=KIND, parameters=values, geometry=geometry, joint_ranges=joint_ranges)
