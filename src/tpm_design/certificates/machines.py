@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from tpm_design.certificates.demands import Demand
 from tpm_design.errors import ParameterError
 from tpm_design.mechanisms.mechanism import Mechanism
@@ -112,8 +114,6 @@ def _slack_at(demand: Demand, context: Context, pose: Pose | None) -> Callable[[
     index = demand.index(context.mechanism.kind)
 
     def at(machine: Mechanism) -> float:
-        import numpy as np
-
         value = index_values(machine.geometry, context.mode.signs, index, np.array([pose]))[0]
         # index values are signed so that less is worse
         return float(value)
