@@ -6,6 +6,7 @@ are welded to the platform; rods end in ball joints, two of them to a parallelog
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -26,11 +27,11 @@ def square_to(axis: FloatArray) -> FloatArray:
 
 
 def outward(azimuth: float) -> FloatArray:
-    return np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    return np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
 
 
 def on_sphere(azimuth: float, elevation: float) -> FloatArray:
-    return np.cos(elevation) * outward(azimuth) + np.sin(elevation) * UP
+    return math.cos(elevation) * outward(azimuth) + math.sin(elevation) * UP
 
 
 def motors(joint: str) -> tuple[dict[str, float], ...]:
@@ -159,7 +160,7 @@ def linear_delta(parameters: Parameters) -> MultibodyModel:
     for limb in LIMBS:
         direction = outward(parameters["azimuth"][limb])
         tilt = parameters["tilt"][limb]
-        rail = np.sin(tilt) * direction - np.cos(tilt) * UP
+        rail = math.sin(tilt) * direction - math.cos(tilt) * UP
         top = parameters["R"][limb] * direction
         writer.site(writer.base, f"{limb}.top", top)
         carriage = writer.slide(writer.base, f"{limb}.slide", rail, top)
@@ -199,8 +200,8 @@ def puu(parameters: Parameters) -> MultibodyModel:
     for limb, azimuth in enumerate(np.radians([210.0, 90.0, 330.0])):
         direction = outward(float(azimuth))
         tangent = np.cross(UP, direction)
-        rail = -np.cos(theta) * direction + np.sin(theta) * UP
-        mirrored = -np.cos(theta) * direction - np.sin(theta) * UP
+        rail = -math.cos(theta) * direction + math.sin(theta) * UP
+        mirrored = -math.cos(theta) * direction - math.sin(theta) * UP
         carriage = writer.slide(writer.base, f"{limb}.slide", rail, R * direction)
         lower_cross = writer.hinge(carriage, f"{limb}.first", rail)
         link = writer.hinge(lower_cross, f"{limb}.second", tangent)
