@@ -202,6 +202,7 @@ def puu(parameters: Parameters) -> MultibodyModel:
         tangent = np.cross(UP, direction)
         rail = -math.cos(theta) * direction + math.sin(theta) * UP
         mirrored = -math.cos(theta) * direction - math.sin(theta) * UP
+        writer.site(writer.base, f"{limb}.start", R * direction)
         carriage = writer.slide(writer.base, f"{limb}.slide", rail, R * direction)
         lower_cross = writer.hinge(carriage, f"{limb}.first", rail)
         link = writer.hinge(lower_cross, f"{limb}.second", tangent)
