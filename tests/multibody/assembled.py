@@ -78,6 +78,13 @@ class Assembled:
         platform = np.vstack([free[start : start + 3], orientation @ free[start + 3 : start + 6]])
         return Motions(np.vstack([self._readout(drive, limb) for limb in LIMBS]) @ free, platform)
 
+    def stiffness(self, locked: str | None) -> FloatArray:
+        """Singular values of the constraints, with the actuators of a drive locked or none, largest first."""
+        mujoco.mj_fwdPosition(self._model, self._data)
+        rows = [] if locked is None else [self._readout(locked, limb) for limb in LIMBS]
+        values: FloatArray = np.linalg.svd(np.vstack([self._jacobian(), *rows]))[1]
+        return values
+
     def _closed_from(self, drive: str, limb: int, target: float, random: np.random.Generator) -> float:
         """What is left of the limb's residual and its actuator's after Newton steps from a random start."""
         rows, columns = self._limb_of_row == limb, self._limb_of_freedom == limb

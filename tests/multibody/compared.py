@@ -8,6 +8,7 @@ from math import radians
 
 import numpy as np
 from mjcf import FloatArray
+from numpy.typing import NDArray
 
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 
@@ -92,7 +93,7 @@ DESIGNS = (
             "azimuth": degrees(-140, -35, 80),
             "tilt": degrees(15, -10, 20),
         },
-        CARRIAGES,
+        ({"carriages": "+++"}, {"carriages": "-+-"}),
     ),
     Design("orthoglide", {"L": 0.31, "d": 0.05}, CARRIAGES),
     Design("orthoglide", {"L": (0.3, 0.35, 0.28), "d": (0.04, -0.02, 0.0)}, CARRIAGES),
@@ -106,16 +107,50 @@ DESIGNS = (
 
 POSES = 4
 
+# mechanism, determinant that changes sign within a working mode, actuators that are locked when it vanishes
+CROSSED: tuple[tuple[str, str, str | None], ...] = (
+    ("uru", "translation", "joint"),
+    ("uru", "actuation", "motor"),
+    ("delta", "actuation", "motor"),
+    ("delta", "rotation", None),
+    ("linear_delta", "actuation", "motor"),
+    ("linear_delta", "rotation", None),
+    ("orthoglide", "actuation", "motor"),
+    ("puu", "actuation", "motor"),
+    ("puu", "rotation", None),
+)
+
 
 def poses_of(mechanism: Mechanism, mode: Mode, random: np.random.Generator) -> FloatArray:
     """Poses (POSES, 3) within reach and off the singularities, where motions are not unique."""
     poses = random.uniform(*_range_of_poses(mechanism), (20000, 3))
-    margins = mechanism.margins(poses, mode)
-    regular = margins["reach"] > 0.02 * mechanism.reach_radius()
-    for name in ("serial", *mechanism.kind.determinants):
-        regular &= np.abs(np.nan_to_num(margins[name])) > 0.1
-    found = poses[regular & np.isfinite(mechanism.ik(poses, mode)).all(axis=1)]
-    return found[:POSES]
+    regular = (np.abs(mechanism.determinants(poses, mode)) > 0.1).all(axis=0)
+    return poses[regular & _closes(mechanism, mode, poses)][:POSES]
+
+
+def crossing(
+    mechanism: Mechanism, mode: Mode, determinant: str, random: np.random.Generator
+) -> tuple[FloatArray, FloatArray] | None:
+    """A regular pose (3,) and one on the way from it to another where the determinant vanishes, both within
+    reach; None if none is found."""
+    index = mechanism.kind.determinants.index(determinant)
+    poses = random.uniform(*_range_of_poses(mechanism), (20000, 3))
+    poses = poses[_closes(mechanism, mode, poses)]
+    values = mechanism.determinants(poses, mode)[index]
+    positive, negative = poses[values > 0.02], poses[values < -0.02]
+    if not len(positive) or not len(negative):
+        return None
+    for _ in range(200):
+        start, end = random.choice(positive), random.choice(negative)
+        if not _closes(mechanism, mode, np.linspace(start, end, 100)).all():
+            continue
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            value = mechanism.determinants(start + middle * (end - start), mode)[index, 0]
+            low, high = (middle, high) if value > 0.0 else (low, middle)
+        return start, start + low * (end - start)
+    return None
 
 
 def placement(mechanism: Mechanism, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -141,12 +176,20 @@ def twists(mechanism: Mechanism, pose: FloatArray) -> FloatArray:
     return np.array(columns).T
 
 
+def _closes(mechanism: Mechanism, mode: Mode, poses: FloatArray) -> NDArray[np.bool_]:
+    """Where (N,) the limbs reach poses (N, 3) without being stretched or folded."""
+    margins = mechanism.margins(poses, mode)
+    inside = (margins["reach"] > 0.02 * mechanism.reach_radius()) & (np.nan_to_num(margins["serial"]) > 0.1)
+    found: NDArray[np.bool_] = inside & np.isfinite(mechanism.ik(poses, mode)).all(axis=1)
+    return found
+
+
 def _range_of_poses(mechanism: Mechanism) -> tuple[FloatArray, FloatArray]:
     radius = mechanism.reach_radius()
     if mechanism.kind.translational:
         return np.full(3, -radius), np.full(3, radius)
     # tilt direction, tilt, distance
-    return np.array([-np.pi, 0.05, 0.0]), np.array([np.pi, 0.7, radius])
+    return np.array([-np.pi, 0.05, 0.0]), np.array([np.pi, 1.3, radius])
 
 
 def _mirrored(parameters: Mapping[str, tuple[float, ...]], pose: FloatArray) -> tuple[FloatArray, FloatArray]:

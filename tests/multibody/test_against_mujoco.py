@@ -13,7 +13,7 @@ pytest.importorskip("mujoco")
 
 from assembled import Assembled, Motions
 from builders import BUILDERS
-from compared import DESIGNS, POSES, placement, poses_of, twists
+from compared import CROSSED, DESIGNS, POSES, crossing, placement, poses_of, twists
 from mjcf import FloatArray
 
 from tpm_design.mechanisms import MECHANISMS, mechanism
@@ -88,3 +88,37 @@ def test_the_constraints_leave_the_motions_of_the_jacobian(number: int, drive: s
         # the platform of a translational mechanism does not turn: expected[3:] is 0 there
         unit_speeds = motions.platform @ np.linalg.pinv(motions.actuators)
         assert np.abs(unit_speeds - comparison.expected).max() < 1e-6 * scale
+
+
+@pytest.mark.parametrize(
+    ("kind", "determinant", "locked"),
+    [
+        pytest.param(*crossed, id="-".join(crossed[:2]), marks=pytest.mark.xdist_group(crossed[0]))
+        for crossed in CROSSED
+        if crossed[0] in MECHANISMS
+    ],
+)
+def test_a_motion_more_where_a_determinant_vanishes(kind: str, determinant: str, locked: str | None) -> None:
+    random = np.random.default_rng(8)
+    compared = 0
+    for design in DESIGNS:
+        for signs in design.modes if design.kind == kind else ():
+            machine = mechanism(kind, **design.parameters)
+            mode = machine.mode_of(signs)
+            found = crossing(machine, mode, determinant, random)
+            if found is None:
+                continue
+            model = Assembled(BUILDERS[kind](machine.parameters))
+            drive = locked or machine.kind.drives[0]
+            stiffness = []
+            for pose in found:
+                model.place(*placement(machine, pose))
+                actuators = machine.ik(pose, mode, drive=drive)[0]
+                model.close(drive, actuators, machine.joint_centres(pose, mode), random)
+                stiffness.append(model.stiffness(locked))
+            regular, singular = stiffness
+            rank = int((regular > 1e-8 * regular[0]).sum())
+            assert singular[rank - 1] < 1e-6 * regular[rank - 1]
+            assert singular[rank - 2] > 1e-3 * regular[rank - 2]
+            compared += 1
+    assert compared > 0
