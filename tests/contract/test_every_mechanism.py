@@ -130,6 +130,27 @@ def test_scale_changes_lengths_and_nothing_else(kind: MechanismKind, machine: Me
     assert np.allclose(scaled.jacobian(3.0 * poses, mode), factor * machine.jacobian(poses, mode), rtol=1e-9)
 
 
+def test_limbs_may_change_places(kind: MechanismKind) -> None:
+    """Dimensions handed on to the next limb are the same machine turned."""
+    if kind.limb_rotation is None:
+        pytest.skip("its limbs are not placed alike")
+    random = np.random.default_rng(8)
+    turn = np.array(kind.limb_rotation)
+    assert np.allclose(turn @ turn.T, np.eye(3), atol=1e-15)
+    lengths = [p.name for p in kind.parameters if p.per_limb and p.domain == "positive"]
+    values = {name: tuple(kind.example[name] * random.uniform(0.9, 1.1, 3)) for name in lengths}
+    machine = kind.build({**kind.example, **values}, {})
+    turned = kind.build({**kind.example, **{name: (v[2], v[0], v[1]) for name, v in values.items()}}, {})
+    mode = first_mode(machine)
+    poses = sample_poses(machine, mode, 30)
+    here, there = machine.margins(poses, mode), turned.margins(poses @ turn.T, mode)
+    for name, margins in here.items():
+        assert np.allclose(there[name], margins, atol=1e-12), name
+    drive = kind.transmission_drive or kind.drives[0]
+    q = machine.ik(poses, mode, drive=drive)
+    assert np.allclose(turned.ik(poses @ turn.T, mode, drive=drive), np.roll(q, 1, axis=1), atol=1e-12)
+
+
 def test_inverse_then_forward_comes_back(machine: Mechanism) -> None:
     mode = first_mode(machine)
     poses = sample_poses(machine, mode, 5)
@@ -150,6 +171,14 @@ def test_impossible_parameters_are_refused_in_words(kind: MechanismKind) -> None
             kind.build({**kind.example, parameter.name: float("nan")}, {})
     with pytest.raises(ParameterError, match="no parameter"):
         kind.build({**kind.example, "nonsense": 1.0}, {})
+
+
+def test_unreachable_poses_have_no_coordinates(machine: Mechanism) -> None:
+    mode = first_mode(machine)
+    far = 10.0 * machine.reach_radius() * np.vstack([np.eye(3), -np.eye(3), np.ones((1, 3))])
+    assert np.isnan(machine.ik(far, mode)).all()
+    assert np.isnan(machine.jacobian(far, mode)).all()
+    assert (machine.margins(far, mode)["reach"] < 0.0).all()
 
 
 def test_bad_poses_are_refused_in_words(machine: Mechanism) -> None:

@@ -36,6 +36,12 @@ from tpm_design.units import Units, si_unit
 def load_study(path: str | Path) -> Study:
     """Reads and checks a study file. Raises StudyError: what is wrong, in which line, what to do."""
     document = read_document(Path(path))
+    if "architectures" in document.data:
+        Faults(document).stop(
+            ("architectures",),
+            "this file compares several architectures",
+            "Use it with optimize or validate; a run of one of them is a study for the other commands.",
+        )
     return resolve(document, parse(document), registries())
 
 
