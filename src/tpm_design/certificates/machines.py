@@ -14,7 +14,7 @@ from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Problem, offset_mechanism
-from tpm_design.workspace.indices import REACH, Index, index_values
+from tpm_design.workspace.indices import index_values
 
 Parameters = Mapping[str, tuple[float, ...]]
 Pose = tuple[float, float, float]
@@ -52,7 +52,7 @@ def slack_of(demand: Demand, context: Context) -> tuple[float, Pose | None]:
     extreme = context.least(demand.index(kind))
     slack = demand.sense * (demand.sign * extreme.value - demand.bound)
     if demand.kind == "reach":
-        inside = context.least(Index(REACH))
+        inside = context.reach
         if inside.value < slack:
             return inside.value, inside.pose
     return slack, extreme.pose

@@ -92,7 +92,12 @@ def _parameters(mechanism: Fields, units: StudyUnits, design: Fields, machine: M
         for key, value in zip(names, values, strict=True):
             if design.number(key) != value:
                 yield f"machine.parameters.{name} is not the design's {key}"
-            if not _allowed(given, key, value, units, _dimension(name)):
+            tie = given.value(key)
+            if isinstance(tie, dict) and "equals" in tie:
+                source = given.fields(key).text("equals")
+                if design.number(source) != value:
+                    yield f"the design's {key} is not its {source}"
+            elif not _allowed(given, key, value, units, _dimension(name)):
                 yield f"the design's {key} is not within what the study gives"
     known = {*PARAMETERS, *(f"{name}{limb + 1}" for name in PARAMETERS for limb in LIMBS)}
     yield from (f"the study has a parameter {name}" for name in given.data if name not in known)

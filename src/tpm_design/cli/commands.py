@@ -17,7 +17,7 @@ from tpm_design.cli.results import design_rows, evaluation_data, limit_text, res
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
 from tpm_design.mechanisms import mechanism_kind
-from tpm_design.problem import Design, evaluate
+from tpm_design.problem import Design, evaluate, with_ties
 from tpm_design.runs.folder import STUDY, newest_run, read_run
 from tpm_design.runs.optimize import check_plan
 from tpm_design.runs.search import best_entry
@@ -104,7 +104,8 @@ def chosen_design(path: Path, settings: Sequence[str]) -> tuple[Study, Design, t
     design, assumptions = choose_design(study, given)
     if stored is None:
         return study, design, assumptions
-    return study, {**stored, **{name: design[name] for name in given}}, ()
+    changed = {**stored, **{name: design[name] for name in given}}
+    return study, with_ties(study.problem.ties, changed), ()
 
 
 def evaluate_one(

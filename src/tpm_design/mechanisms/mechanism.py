@@ -15,6 +15,7 @@ from tpm_design.errors import ParameterError, did_you_mean
 from tpm_design.mechanisms import derived, pointwise  # noqa: F401  (derived equations are registered)
 from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import MechanismKind
+from tpm_design.mechanisms.fold_lines import FoldLine
 from tpm_design.mechanisms.parameters import enclosed_values, mode_signs
 
 FloatArray = NDArray[np.float64]
@@ -53,6 +54,11 @@ class Mechanism(ABC):
     @abstractmethod
     def reach_radius(self) -> float:
         """Every reachable pose lies within this distance (m) of the origin."""
+
+    def fold_lines(self) -> tuple[FoldLine, ...]:
+        """Lines of folded limbs that no region may hold in its interior; none where reach bounds all of them
+        already."""
+        return ()
 
     @abstractmethod
     def enclosed_geometry(self, tolerance: Mapping[str, float]) -> Any:
