@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 from tpm_design.cli.text import table
@@ -16,6 +17,7 @@ from tpm_design.metrics import METRICS
 from tpm_design.metrics.base import Metric, Option
 from tpm_design.optimizers import OPTIMIZERS
 from tpm_design.optimizers.base import Optimizer
+from tpm_design.study.plug_in import kind_in_file
 from tpm_design.workspace.regions import REGIONS, RegionForm
 
 Thing = MechanismKind | Metric | Optimizer | RegionForm
@@ -52,12 +54,8 @@ def summary(thing: Thing) -> str:
     return thing.title if isinstance(thing, MechanismKind) else thing.description
 
 
-def show_thing(name: str, *, as_json: bool) -> int | None:
-    found = [things[name] for things in ROOMS.values() if name in things]
-    if not found:
-        everything = [known for things in ROOMS.values() for known in things]
-        raise UsageError(f"There is no {name!r}.", remedy=did_you_mean(name, everything))
-    thing = found[0]
+def show_thing(name: str, *, allow_code: bool, as_json: bool) -> int | None:
+    thing = _from_file(Path(name), allow_code) if name.endswith(".py") else _registered(name)
     if as_json:
         print(json.dumps(_data(thing), ensure_ascii=False))
     elif isinstance(thing, MechanismKind):
@@ -69,6 +67,24 @@ def show_thing(name: str, *, as_json: bool) -> int | None:
     else:
         print(table(["region", thing.name], [["keys", thing.keys], ["what it is", thing.description]]))
     return None
+
+
+def _registered(name: str) -> Thing:
+    found = [things[name] for things in ROOMS.values() if name in things]
+    if not found:
+        everything = [known for things in ROOMS.values() for known in things]
+        raise UsageError(f"There is no {name!r}.", remedy=did_you_mean(name, everything))
+    return found[0]
+
+
+def _from_file(path: Path, allow_code: bool) -> MechanismKind:
+    if not allow_code:
+        raise UsageError(
+            "To show a mechanism's Python file is to run it, and that was not allowed.",
+            where=str(path),
+            remedy="It can do whatever you can. Read it; if you trust it, add --allow-code.",
+        )
+    return kind_in_file(path)
 
 
 def _mechanism_text(kind: MechanismKind) -> str:

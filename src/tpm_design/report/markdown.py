@@ -306,4 +306,7 @@ def _caveats(reported: Reported) -> list[str]:
 
 def _files(reported: Reported) -> list[str]:
     present = [(name, what) for name, what in FILES if (reported.run.folder / name).is_file()]
+    plug_in = reported.study.plug_in
+    if plug_in is not None:
+        present.append((plug_in.name, "the mechanism's formulas, the user's own"))
     return ["## Files", "", *(f"- [{name}]({name}): {what}" for name, what in present)]
