@@ -100,16 +100,17 @@ def _mechanism_text(kind: MechanismKind) -> str:
     limits = [[x.name, units[x.dimension], x.kind, x.description] for x in kind.limits]
     singularities = [[s.name, s.equation, s.condition] for s in kind.singularities]
     drives = ", ".join(kind.drives)
-    return "\n\n".join(
-        [
-            f"{kind.name}: {kind.title}\nSource: {kind.source}\nPose: {', '.join(kind.pose)} (length). "
-            f"Actuator coordinates: {kind.limb_count}, in {kind.actuator_unit}; driven by: {drives}.",
-            table(["parameter", "symbol", "unit", "must be", "limb by limb", "what it is"], parameters),
-            table(["working mode", "value", "what it is"], modes),
-            table(["limit", "unit", "form", "what it is"], limits),
-            table(["singularity", "equation", "condition"], singularities),
-        ]
+    tables = [
+        (["parameter", "symbol", "unit", "must be", "limb by limb", "what it is"], parameters),
+        (["working mode", "value", "what it is"], modes),
+        (["limit", "unit", "form", "what it is"], limits),
+        (["singularity", "equation", "condition"], singularities),
+    ]
+    head = (
+        f"{kind.name}: {kind.title}\nSource: {kind.source}\nPose: {', '.join(kind.pose)} (length). "
+        f"Actuator coordinates: {kind.limb_count}, in {kind.actuator_unit}; driven by: {drives}."
     )
+    return "\n\n".join([head, *(table(headings, rows) for headings, rows in tables if rows)])
 
 
 def _metric_text(metric: Metric) -> str:

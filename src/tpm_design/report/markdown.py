@@ -93,6 +93,8 @@ def _question(reported: Reported) -> list[str]:
     else:
         where = f"{shape_text(problem.region, units)}, {centre_text(problem, units)}"
         lines += ["", f"The useful region is {text(where)}."]
+    if not problem.kind.mode_fields:
+        return lines
     modes = ", ".join(code(label) for label in problem.modes)
     if len(problem.modes) > MOST_LISTED:
         modes = f"any of {len(problem.modes)}"
