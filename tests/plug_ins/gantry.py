@@ -143,7 +143,8 @@ class Gantry(Mechanism):
 
     def enclosed_link_length(self, tolerance: Mapping[str, float]) -> Interval:
         h1, h2, h3 = self.enclosed_geometry(tolerance).half
-        return 2.0 * (h1 + h2 + h3)
+        total: Interval = 2.0 * (h1 + h2 + h3)
+        return total
 
     def assemblies(self, q: Any, mode: Mode | None = None, *, drive: str = "motor") -> tuple[Assembly, ...]:
         self.motor_weight(drive)

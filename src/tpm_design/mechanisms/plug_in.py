@@ -33,7 +33,7 @@ MEMBERS: Mapping[str, type] = {
     "singularities": Singularity,
 }
 """Fields of a ``MechanismKind`` that are tuples, and what is in them."""
-PATTERN = "src/tpm_design/mechanisms/uru.py and CONTRIBUTING.md show how a mechanism is written."
+PATTERN = "The project's CONTRIBUTING.md says how a mechanism is written."
 
 
 def load_kind(source: bytes, path: Path, taken: Collection[str]) -> MechanismKind:
@@ -145,6 +145,9 @@ def fault_of_plug_in(error: BaseException) -> str | None:
 
 def described(error: BaseException) -> str:
     """An error in one line: what it is, and the first line of its text that says anything."""
+    lacking = re.search(r"No implementation of function Function\(<function (\w+) at ", str(error))
+    if lacking:
+        return f"there is no {lacking[1]} that compiles"
     lines = [line.strip() for line in str(error).splitlines()]
     telling = [line for line in lines if line and not line.startswith("Failed in nopython mode")]
     return f"{type(error).__name__}{f': {telling[0][:300]}' if telling else ''}"
