@@ -12,6 +12,7 @@ import re
 import sys
 import traceback
 from collections.abc import Callable, Collection, Mapping
+from itertools import pairwise
 from pathlib import Path
 from types import FrameType, ModuleType
 from typing import Any, NoReturn
@@ -33,6 +34,7 @@ MEMBERS: Mapping[str, type] = {
     "singularities": Singularity,
 }
 """Fields of a ``MechanismKind`` that are tuples, and what is in them."""
+COMPILING = "Failed in nopython mode pipeline"
 PATTERN = "The project's CONTRIBUTING.md says how a mechanism is written."
 
 
@@ -44,9 +46,17 @@ def load_kind(source: bytes, path: Path, taken: Collection[str]) -> MechanismKin
     file raises, where there is no usable ``KIND``, and where its example cannot be built.
     """
     name = PLUG_IN + hashlib.sha256(source).hexdigest()[:24]
-    module = sys.modules.get(name)
-    if module is None:
-        module = _run(source, path, name)
+    if name in sys.modules:
+        return _kind_of(sys.modules[name], path, taken)
+    try:
+        return _kind_of(_run(source, path, name), path, taken)
+    except BaseException:
+        sys.modules.pop(name, None)
+        follow_plug_ins()
+        raise
+
+
+def _kind_of(module: ModuleType, path: Path, taken: Collection[str]) -> MechanismKind:
     kind = getattr(module, "KIND", None)
     if kind is None:
         _refuse(path, "the file defines no KIND", f"Write `KIND = MechanismKind(…)`. {PATTERN}")
@@ -73,12 +83,7 @@ def _run(source: bytes, path: Path, name: str) -> ModuleType:
     module.__file__ = file
     sys.modules[name] = module
     follow_plug_ins()
-    try:
-        _told(lambda: exec(code, module.__dict__), path, "the file cannot be loaded")
-    except BaseException:
-        del sys.modules[name]
-        follow_plug_ins()
-        raise
+    _told(lambda: exec(code, module.__dict__), path, "the file cannot be loaded")
     return module
 
 
@@ -144,13 +149,14 @@ def fault_of_plug_in(error: BaseException) -> str | None:
 
 
 def described(error: BaseException) -> str:
-    """An error in one line: what it is, and the first line of its text that says anything."""
-    lacking = re.search(r"No implementation of function Function\(<function (\w+) at ", str(error))
+    """An error in one line: of Numba's account, which tells every formula on the way, the innermost reason."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    inner = [line for before, line in pairwise(lines) if COMPILING in before and COMPILING not in line]
+    reason = inner[-1] if inner else lines[0] if lines else "no reason given"
+    lacking = re.match(r"No implementation of function Function\(<function (\w+) at ", reason)
     if lacking:
-        return f"there is no {lacking[1]} that compiles"
-    lines = [line.strip() for line in str(error).splitlines()]
-    telling = [line for line in lines if line and not line.startswith("Failed in nopython mode")]
-    return f"{type(error).__name__}{f': {telling[0][:300]}' if telling else ''}"
+        return f"there is no {lacking[1]} for such arguments"
+    return f"{type(error).__name__}: {reason[:300]}"
 
 
 def _is_plug_in(frame: FrameType) -> bool:
