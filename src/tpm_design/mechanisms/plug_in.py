@@ -149,7 +149,7 @@ def fault_of_plug_in(error: BaseException) -> str | None:
 
 
 def described(error: BaseException) -> str:
-    """An error in one line: of Numba's account, which tells every formula on the way, the innermost reason."""
+    """An error in a line: of Numba's account, which tells every formula on the way, the innermost reason."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     inner = [line for before, line in pairwise(lines) if COMPILING in before and COMPILING not in line]
     reason = inner[-1] if inner else lines[0] if lines else "no reason given"
