@@ -19,7 +19,7 @@ from command_line import tpm_design
 
 import tpm_design as tpm
 from tpm_design.arithmetic.compilation import follow_plug_ins
-from tpm_design.arithmetic.kernel_cache import loaded_plug_ins
+from tpm_design.arithmetic.kernel_cache import PLUG_IN
 from tpm_design.errors import PlugInError, StudyError
 from tpm_design.mechanisms.plug_in import load_kind
 from tpm_design.study import study_schema
@@ -58,11 +58,16 @@ def written(folder: Path, source: str = GANTRY, study: str = STUDY, name: str = 
     return folder
 
 
+def plug_ins() -> list[str]:
+    """Modules of this process that are plug-ins."""
+    return [name for name in sys.modules if name.startswith(PLUG_IN)]
+
+
 @pytest.fixture(autouse=True)
 def forget_plug_ins() -> Iterator[None]:
     """Afterwards, kernels lie again where tests without plug-ins have them."""
     yield
-    for name in loaded_plug_ins():
+    for name in plug_ins():
         del sys.modules[name]
     follow_plug_ins()
 
@@ -74,8 +79,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def command(home: Path) -> Command:
-    """Runs one command in a folder."""
+def python(home: Path) -> Command:
+    """Runs Python in a folder."""
     environment = os.environ | {
         "PYTHONPATH": os.pathsep.join(sys.path),
         "HOME": str(home),
@@ -85,7 +90,7 @@ def command(home: Path) -> Command:
 
     def run(folder: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [sys.executable, "-m", "tpm_design", *map(str, arguments)],
+            [sys.executable, *map(str, arguments)],
             cwd=folder,
             env=environment,
             capture_output=True,
@@ -95,6 +100,12 @@ def command(home: Path) -> Command:
         )
 
     return run
+
+
+@pytest.fixture(scope="module")
+def command(python: Command) -> Command:
+    """Runs one command in a folder."""
+    return lambda folder, *arguments: python(folder, "-m", "tpm_design", *arguments)
 
 
 def kernels(home: Path) -> dict[str, dict[str, int]]:
@@ -212,7 +223,9 @@ def test_its_constraints_are_settled_and_no_checker_pretends_to_know_it(
 # ---------------------------------------------------------------------------------- compiled kernels
 
 
-def test_kernels_are_compiled_once_and_apart(command: Command, home: Path, run_folder: Path) -> None:
+def test_kernels_are_compiled_once_and_apart(
+    command: Command, python: Command, home: Path, run_folder: Path
+) -> None:
     """Also for the copy in the run folder: the content counts, not the place."""
     folder = run_folder.parents[2]
     pose = ("--at", "10,20,-30", "--allow-code", "--json")
@@ -224,13 +237,31 @@ def test_kernels_are_compiled_once_and_apart(command: Command, home: Path, run_f
     assert first.stdout == second.stdout
     # x = k q
     assert json.loads(first.stdout)["actuators"]["motor"]["value"] == pytest.approx([5.0, 10.0, -15.0])
-    # a program that loads no plug-in uses a folder where none is named
-    program = "from tpm_design.arithmetic.kernel_cache import FOLDER; print(FOLDER.name)"
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "XDG_CACHE_HOME": str(home)}
-    done = subprocess.run(
-        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+    assert knows_nothing(kernels(home), python, folder)
+
+
+FOLDER = "from tpm_design.arithmetic.kernel_cache import FOLDER; print(FOLDER.name)"
+
+
+def knows_nothing(found: dict[str, dict[str, int]], python: Command, folder: Path) -> bool:
+    """Whether no kernel lies where a program without plug-ins looks."""
+    return found.get(python(folder, "-c", FOLDER).stdout.strip(), {}) == {}
+
+
+def test_a_plug_in_that_is_imported_keeps_its_kernels_apart_too(
+    python: Command, home: Path, tmp_path: Path
+) -> None:
+    folder = written(tmp_path / "imported")
+    program = (
+        "from gantry import KIND\n"
+        "machine = KIND.build(KIND.example, {})\n"
+        "print(machine.ik([[0.1, 0.0, 0.0]], machine.mode_of({})).tolist())"
     )
-    assert kernels(home)[done.stdout.strip()] == {}
+    before = kernels(home)
+    done = python(folder, "-c", program)
+    assert done.stdout.strip() == "[[0.1, 0.0, 0.0]]", done.stderr
+    assert kernels(home) != before
+    assert knows_nothing(kernels(home), python, folder)
 
 
 def test_a_changed_file_is_compiled_anew(command: Command, tmp_path: Path) -> None:
@@ -290,7 +321,7 @@ def test_a_broken_file_is_one_message(tmp_path: Path, source: str, place: str, w
     assert words in caught.value.what
     assert caught.value.exit_code == 2
     assert caught.value.remedy
-    assert loaded_plug_ins() == ()
+    assert plug_ins() == []
 
 
 def test_the_command_line_tells_a_broken_file_and_formulas_that_do_not_compile(

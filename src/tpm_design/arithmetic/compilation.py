@@ -102,6 +102,13 @@ def _without_entry(function: Function, *, inline: bool) -> Any:
     return compiled
 
 
+def keep_apart(module: str) -> None:
+    """Keep kernels that are compiled from now on away from programs that do not know the classes of
+    ``module``, which is not of this package."""
+    if kernel_cache.note_plug_in(module):
+        follow_plug_ins()
+
+
 def is_number(kind: Any) -> bool:
     """Whether a Numba type is a plain real number."""
     return isinstance(kind, types.Float | types.Integer)

@@ -34,9 +34,24 @@ PLUG_IN = "tpm_design_plug_in_"
 """How the names of modules that are plug-ins begin; the rest is a hash of their content."""
 
 
+_IMPORTED: dict[str, str] = {}
+
+
+def note_plug_in(module: str) -> bool:
+    """Note a module outside this package whose classes kernels may be compiled for, such as a plug-in that is
+    imported as any other module is; whether that is news."""
+    if module.startswith((PLUG_IN, "tpm_design.")) or module in _IMPORTED:
+        return False
+    file = getattr(sys.modules.get(module), "__file__", None)
+    content = Path(file).read_bytes() if file is not None and Path(file).is_file() else b""
+    _IMPORTED[module] = f"{module} {blake2b(content, digest_size=12).hexdigest()}"
+    return True
+
+
 def loaded_plug_ins() -> tuple[str, ...]:
-    """Names of the plug-ins that this program has loaded."""
-    return tuple(sorted(name for name in sys.modules if name.startswith(PLUG_IN)))
+    """Names of the plug-ins that this program has loaded, each with a hash of its content."""
+    loaded = [name for name in sys.modules if name.startswith(PLUG_IN)]
+    return tuple(sorted([*loaded, *_IMPORTED.values()]))
 
 
 def source_hash(package: Path, plug_ins: Sequence[str] = ()) -> str:

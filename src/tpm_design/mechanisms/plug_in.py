@@ -18,7 +18,7 @@ from types import FrameType, ModuleType
 from typing import Any, NoReturn
 
 from tpm_design.arithmetic.compilation import follow_plug_ins
-from tpm_design.arithmetic.kernel_cache import PLUG_IN, loaded_plug_ins
+from tpm_design.arithmetic.kernel_cache import PLUG_IN
 from tpm_design.errors import PlugInError, TpmDesignError
 from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.mechanism import Mechanism
@@ -134,13 +134,12 @@ def _check_example(kind: MechanismKind, path: Path) -> None:
 def fault_of_plug_in(error: BaseException) -> str | None:
     """Where the plug-in is to blame for an error: its file, and the line if there is one. None where it was
     raised neither by a plug-in nor by Numba as it compiled one."""
-    names = loaded_plug_ins()
+    files = [str(module.__file__) for name, module in sys.modules.items() if name.startswith(PLUG_IN)]
     for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
         if _is_plug_in(frame):
             return f"{frame.f_code.co_filename}:{line}"
-    if not names or not type(error).__module__.startswith("numba."):
+    if not files or not type(error).__module__.startswith("numba."):
         return None
-    files = [str(sys.modules[name].__file__) for name in names]
     for shown, number in reversed(re.findall(r'File "([^"\n]+)", line (\d+)', str(error))):
         for file in files:
             if Path(shown).name == Path(file).name:
