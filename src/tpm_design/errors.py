@@ -35,6 +35,10 @@ class StudyError(TpmDesignError):
     """A study file that cannot be used."""
 
 
+class PlugInError(TpmDesignError):
+    """A mechanism's own Python file that cannot be used."""
+
+
 class ParameterError(TpmDesignError):
     """A design parameter, mode or option that has no meaning."""
 

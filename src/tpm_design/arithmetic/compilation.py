@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from tpm_design.arithmetic import kernel_cache  # noqa: F401  (before Numba)
+from tpm_design.arithmetic import kernel_cache  # before Numba
 
 # isort: split
 from numba import njit, types
@@ -59,9 +59,30 @@ class _InnerFunction(CPUDispatcher):
         raise TypeError(f"{self.py_func.__name__} serves compiled code only")
 
 
+_KERNELS: list[Any] = []
+
+
 def kernel(function: Function) -> Any:
     """Compile a function that Python calls, and keep it on disk."""
-    return njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function)
+    return _kept(njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function))
+
+
+def fast_kernel(function: Function) -> Any:
+    """As ``kernel``, for a loop of floats that may be reordered and vectorised."""
+    return _kept(njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)(function))
+
+
+def _kept(compiled: Any) -> Any:
+    _KERNELS.append(compiled)
+    return compiled
+
+
+def follow_plug_ins() -> None:
+    """Look for kernels, and keep them, in the folder that belongs to the plug-ins that are loaded now."""
+    kernel_cache.use_kernel_cache()
+    for compiled in _KERNELS:
+        # a dispatcher chooses its folder when it is told to use one
+        compiled.enable_caching()
 
 
 def inner(function: Function) -> Any:
@@ -79,6 +100,13 @@ def _without_entry(function: Function, *, inline: bool) -> Any:
     compiled = njit(nogil=True, error_model="numpy", forceinline=inline, **_NO_ENTRY)(function)
     compiled.__class__ = _InnerFunction
     return compiled
+
+
+def keep_apart(module: str) -> None:
+    """Keep kernels that are compiled from now on away from programs that do not know the classes of
+    ``module``, which is not of this package."""
+    if kernel_cache.note_plug_in(module):
+        follow_plug_ins()
 
 
 def is_number(kind: Any) -> bool:

@@ -21,7 +21,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from tpm_design.arithmetic.compilation import FAST, STRICT
+from tpm_design.arithmetic.compilation import FAST, STRICT, keep_apart
 from tpm_design.arithmetic.dual import is_dual
 from tpm_design.arithmetic.interval import is_interval
 
@@ -62,6 +62,8 @@ def _registered(
     stub: Callable[..., Any], serves: Callable[[type | None], bool]
 ) -> Callable[[Implementation], Implementation]:
     parameters = list(inspect.signature(stub).parameters)
+    if stub.__module__.startswith("tpm_design."):
+        keep_apart(geometry_class.__module__)
 
     def register(implementation: Implementation) -> Implementation:
         if list(inspect.signature(implementation).parameters) != parameters:

@@ -85,6 +85,7 @@ class _Check:
                 where=certificate.file,
                 remedy="Check it with the version of tpm-design that wrote it.",
             )
+        _refuse_plug_in(certificate)
         certificate.fields("versions")
         if certificate.text("study_sha256") != canonical_sha256(certificate.fields("study").data):
             self.faults.append("study_sha256 is not that of the study")
@@ -168,6 +169,19 @@ class _Check:
         due = "refuted" if "refuted" in outcomes else "undecided" if "undecided" in outcomes else "proved"
         if outcome != due:
             self.faults.append(f"outcome is {outcome}, by its requirements it is {due}")
+
+
+def _refuse_plug_in(certificate: Fields) -> None:
+    """What a mechanism's own file says can only be believed: nothing here could contradict it."""
+    study = certificate.data.get("study")
+    mechanism = study.get("mechanism") if isinstance(study, dict) else None
+    if isinstance(mechanism, dict) and "file" in mechanism:
+        raise UsageError(
+            f"the mechanism is a Python file of its user, {mechanism['file']!r}: it cannot be checked",
+            where=certificate.file,
+            remedy="The check writes every mechanism's equations anew, and knows the built-in ones alone. "
+            "To prove it again by the same formulas, run `tpm-design certify` on the study.",
+        )
 
 
 def _gap(claim: Claim, domains: list[Domain]) -> str | None:

@@ -21,6 +21,12 @@ app = typer.Typer(
 
 Study = Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (YAML).", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="Machine-readable output on standard output.")]
+AllowCode = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code", help="Run the Python file that a study names as its mechanism; read it first."
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print results only, no progress.")]
 
 
@@ -62,12 +68,13 @@ def init(
 def validate(
     study: Study,
     resolved: Annotated[bool, typer.Option("--resolved", help="Print the study with every default.")] = False,
+    allow_code: AllowCode = False,
     quiet: Quiet = False,
 ) -> int | None:
     """Check a study completely; run nothing."""
     from tpm_design.cli.commands import validate_study
 
-    return validate_study(study, resolved=resolved, quiet=quiet)
+    return validate_study(study, resolved=resolved, allow_code=allow_code, quiet=quiet)
 
 
 @app.command()
@@ -97,13 +104,16 @@ def list_(
 @app.command()
 @guarded
 def show(
-    name: Annotated[str, typer.Argument(help="A mechanism, metric, optimizer or region.")],
+    name: Annotated[
+        str, typer.Argument(help="A mechanism, metric, optimizer or region, or a mechanism's Python file.")
+    ],
+    allow_code: AllowCode = False,
     as_json: Json = False,
 ) -> int | None:
     """Explain one of them: parameters, units, options, source of its equations."""
     from tpm_design.cli.catalogue import show_thing
 
-    return show_thing(name, as_json=as_json)
+    return show_thing(name, allow_code=allow_code, as_json=as_json)
 
 
 @app.command()
@@ -118,13 +128,14 @@ def evaluate(
         str | None,
         typer.Option(metavar="X,Y,Z", help="Joint values, Jacobian and margins at this pose instead."),
     ] = None,
+    allow_code: AllowCode = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int | None:
     """Evaluate one design: every metric with its unit and numeric error."""
     from tpm_design.cli.commands import evaluate_one
 
-    return evaluate_one(study, settings or [], at, as_json=as_json, quiet=quiet)
+    return evaluate_one(study, settings or [], at, allow_code=allow_code, as_json=as_json, quiet=quiet)
 
 
 @app.command()
@@ -135,13 +146,16 @@ def optimize(
     budget: Annotated[int | None, typer.Option(help="Number of evaluations, instead of the study's.")] = None,
     workers: Annotated[int | None, typer.Option(help="Threads; one per processor if left out.")] = None,
     output: Annotated[Path, typer.Option(metavar="DIR", help="Folder for run folders.")] = Path("results"),
+    allow_code: AllowCode = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int | None:
     """Search the design space of a study; the run is written below results/."""
     from tpm_design.cli.commands import optimize_one
 
-    return optimize_one(study, seed, budget, workers, output, as_json=as_json, quiet=quiet)
+    return optimize_one(
+        study, seed, budget, workers, output, allow_code=allow_code, as_json=as_json, quiet=quiet
+    )
 
 
 @app.command()
@@ -172,6 +186,7 @@ def certify(
         ),
     ] = None,
     workers: Annotated[int | None, typer.Option(help="One per processor if left out.")] = None,
+    allow_code: AllowCode = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int | None:
@@ -179,7 +194,15 @@ def certify(
     from tpm_design.cli.certify import certify_one
 
     return certify_one(
-        study, settings or [], max_tolerance, check, output, workers, as_json=as_json, quiet=quiet
+        study,
+        settings or [],
+        max_tolerance,
+        check,
+        output,
+        workers,
+        allow_code=allow_code,
+        as_json=as_json,
+        quiet=quiet,
     )
 
 
@@ -189,12 +212,13 @@ def report(
     runs: Annotated[
         list[Path] | None, typer.Argument(metavar="[RUN ...]", help="Run folders; the newest if left out.")
     ] = None,
+    allow_code: AllowCode = False,
     quiet: Quiet = False,
 ) -> int | None:
     """Write report.md and figures/*.png into run folders."""
     from tpm_design.cli.commands import report_runs
 
-    return report_runs(runs or [], quiet=quiet)
+    return report_runs(runs or [], allow_code=allow_code, quiet=quiet)
 
 
 def main() -> None:

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 from tpm_design.cli.text import table
@@ -16,6 +17,7 @@ from tpm_design.metrics import METRICS
 from tpm_design.metrics.base import Metric, Option
 from tpm_design.optimizers import OPTIMIZERS
 from tpm_design.optimizers.base import Optimizer
+from tpm_design.study.plug_in import kind_in_file
 from tpm_design.workspace.regions import REGIONS, RegionForm
 
 Thing = MechanismKind | Metric | Optimizer | RegionForm
@@ -52,12 +54,8 @@ def summary(thing: Thing) -> str:
     return thing.title if isinstance(thing, MechanismKind) else thing.description
 
 
-def show_thing(name: str, *, as_json: bool) -> int | None:
-    found = [things[name] for things in ROOMS.values() if name in things]
-    if not found:
-        everything = [known for things in ROOMS.values() for known in things]
-        raise UsageError(f"There is no {name!r}.", remedy=did_you_mean(name, everything))
-    thing = found[0]
+def show_thing(name: str, *, allow_code: bool, as_json: bool) -> int | None:
+    thing = _from_file(Path(name), allow_code) if name.endswith(".py") else _registered(name)
     if as_json:
         print(json.dumps(_data(thing), ensure_ascii=False))
     elif isinstance(thing, MechanismKind):
@@ -69,6 +67,24 @@ def show_thing(name: str, *, as_json: bool) -> int | None:
     else:
         print(table(["region", thing.name], [["keys", thing.keys], ["what it is", thing.description]]))
     return None
+
+
+def _registered(name: str) -> Thing:
+    found = [things[name] for things in ROOMS.values() if name in things]
+    if not found:
+        everything = [known for things in ROOMS.values() for known in things]
+        raise UsageError(f"There is no {name!r}.", remedy=did_you_mean(name, everything))
+    return found[0]
+
+
+def _from_file(path: Path, allow_code: bool) -> MechanismKind:
+    if not allow_code:
+        raise UsageError(
+            "To show a mechanism's Python file is to run it, and that was not allowed.",
+            where=str(path),
+            remedy="It can do whatever you can. Read it; if you trust it, add --allow-code.",
+        )
+    return kind_in_file(path)
 
 
 def _mechanism_text(kind: MechanismKind) -> str:
@@ -84,16 +100,17 @@ def _mechanism_text(kind: MechanismKind) -> str:
     limits = [[x.name, units[x.dimension], x.kind, x.description] for x in kind.limits]
     singularities = [[s.name, s.equation, s.condition] for s in kind.singularities]
     drives = ", ".join(kind.drives)
-    return "\n\n".join(
-        [
-            f"{kind.name}: {kind.title}\nSource: {kind.source}\nPose: {', '.join(kind.pose)} (length). "
-            f"Actuator coordinates: {kind.limb_count}, in {kind.actuator_unit}; driven by: {drives}.",
-            table(["parameter", "symbol", "unit", "must be", "limb by limb", "what it is"], parameters),
-            table(["working mode", "value", "what it is"], modes),
-            table(["limit", "unit", "form", "what it is"], limits),
-            table(["singularity", "equation", "condition"], singularities),
-        ]
+    tables = [
+        (["parameter", "symbol", "unit", "must be", "limb by limb", "what it is"], parameters),
+        (["working mode", "value", "what it is"], modes),
+        (["limit", "unit", "form", "what it is"], limits),
+        (["singularity", "equation", "condition"], singularities),
+    ]
+    head = (
+        f"{kind.name}: {kind.title}\nSource: {kind.source}\nPose: {', '.join(kind.pose)} (length). "
+        f"Actuator coordinates: {kind.limb_count}, in {kind.actuator_unit}; driven by: {drives}."
     )
+    return "\n\n".join([head, *(table(headings, rows) for headings, rows in tables if rows)])
 
 
 def _metric_text(metric: Metric) -> str:

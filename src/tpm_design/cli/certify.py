@@ -37,6 +37,7 @@ def certify_one(
     output: Path | None,
     workers: int | None,
     *,
+    allow_code: bool,
     as_json: bool,
     quiet: bool,
 ) -> int | None:
@@ -45,7 +46,7 @@ def certify_one(
             f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
         )
     if check is not None:
-        if path is not None or settings or max_tolerance or output is not None:
+        if path is not None or settings or max_tolerance or output is not None or allow_code:
             raise UsageError(
                 "--check stands alone.", where="certify", remedy="Write `tpm-design certify --check FILE`."
             )
@@ -54,7 +55,7 @@ def certify_one(
         raise UsageError(
             "Nothing to certify.", where="certify", remedy="Name a study, a run folder, or --check FILE."
         )
-    study, design, assumptions = chosen_design(path, settings)
+    study, design, assumptions = chosen_design(path, settings, allow_code=allow_code)
     if not study.problem.constraints:
         raise UsageError(
             "The study has no constraints, so that there is nothing to prove.",
@@ -76,8 +77,14 @@ def certify_one(
         if not quiet:
             print(table(["design", "value", "searched in"], _design_rows(study, design)) + "\n")
         print(verdict_text(study, found))
-        print(f"Certificate: {target}\nNext: tpm-design certify --check {target}")
+        print(f"Certificate: {target}\n{_next(study, target)}")
     return None if found.outcome == "proved" else NOT_PROVED
+
+
+def _next(study: Study, target: Path) -> str:
+    if study.plug_in is not None:
+        return f"It rests on the formulas of {study.plug_in.name}: no second implementation can check it."
+    return f"Next: tpm-design certify --check {target}"
 
 
 def _design_rows(study: Study, design: Design) -> list[list[str]]:

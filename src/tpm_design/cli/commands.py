@@ -53,8 +53,8 @@ def init_study(name: str, mechanism: str) -> int | None:
     return None
 
 
-def validate_study(path: Path, *, resolved: bool, quiet: bool) -> int | None:
-    comparison = load_comparison(path)
+def validate_study(path: Path, *, resolved: bool, allow_code: bool, quiet: bool) -> int | None:
+    comparison = load_comparison(path, allow_code=allow_code)
     if comparison is not None:
         for study in comparison.studies.values():
             check_plan(study.problem, plan_of(study))
@@ -63,7 +63,7 @@ def validate_study(path: Path, *, resolved: bool, quiet: bool) -> int | None:
         elif not quiet:
             print(f"{path} is valid: {', '.join(comparison.studies)}, asked the same.")
         return None
-    study = load_study(path)
+    study = load_study(path, allow_code=allow_code)
     if study.problem.variables and len(study.problem.objectives) == 1:
         check_plan(study.problem, plan_of(study))
     if resolved:
@@ -82,12 +82,12 @@ def print_schema() -> int | None:
     return None
 
 
-def open_study(path: Path) -> tuple[Study, Design | None]:
+def open_study(path: Path, *, allow_code: bool) -> tuple[Study, Design | None]:
     """A study from its file, or from a run folder with the best design of the run, finished or not."""
     if not path.is_dir():
-        return load_study(path), None
+        return load_study(path, allow_code=allow_code), None
     run = read_run(path)
-    study = load_study(path / STUDY)
+    study = load_study(path / STUDY, allow_code=allow_code)
     best = run.best or best_entry(study.problem, run.entries)
     if best is None:
         raise UsageError(
@@ -96,10 +96,12 @@ def open_study(path: Path) -> tuple[Study, Design | None]:
     return study, best.evaluation.design
 
 
-def chosen_design(path: Path, settings: Sequence[str]) -> tuple[Study, Design, tuple[str, ...]]:
+def chosen_design(
+    path: Path, settings: Sequence[str], *, allow_code: bool
+) -> tuple[Study, Design, tuple[str, ...]]:
     """A study and one design of it: the run's best where ``path`` is a run, changed by ``--set``; and a line
     for each quantity that was assumed."""
-    study, stored = open_study(path)
+    study, stored = open_study(path, allow_code=allow_code)
     given = _settings(settings)
     design, assumptions = choose_design(study, given)
     if stored is None:
@@ -109,9 +111,9 @@ def chosen_design(path: Path, settings: Sequence[str]) -> tuple[Study, Design, t
 
 
 def evaluate_one(
-    path: Path, settings: Sequence[str], at: str | None, *, as_json: bool, quiet: bool
+    path: Path, settings: Sequence[str], at: str | None, *, allow_code: bool, as_json: bool, quiet: bool
 ) -> int | None:
-    study, design, assumptions = chosen_design(path, settings)
+    study, design, assumptions = chosen_design(path, settings, allow_code=allow_code)
     pose = None if at is None else _pose(study, at)
     if pose is not None:
         return _print_pose(study, design, pose, as_json=as_json)
@@ -218,6 +220,7 @@ def optimize_one(
     workers: int | None,
     output: Path,
     *,
+    allow_code: bool,
     as_json: bool,
     quiet: bool,
 ) -> int | None:
@@ -226,11 +229,11 @@ def optimize_one(
             f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
         )
     threads = workers or usable_processors()
-    comparison = load_comparison(path)
+    comparison = load_comparison(path, allow_code=allow_code)
     # short compiled calls by several threads: the usual 5 ms would make them wait for one another
     sys.setswitchinterval(SWITCH_INTERVAL)
     if comparison is None:
-        study = load_study(path).searched_with(seed=seed, budget=budget)
+        study = load_study(path, allow_code=allow_code).searched_with(seed=seed, budget=budget)
         run = _searched(study, threads, output, quiet=quiet or as_json)
         print(json.dumps(_run_data(study, run), ensure_ascii=False) if as_json else _run_text(study, run))
         return _ending(run)
@@ -285,7 +288,9 @@ def _run_text(study: Study, run: Run) -> str:
         ]
     if run.verdict is not None:
         parts.append(verdict_text(study, run.verdict))
-    lines = [run.status, *run.result.remarks, f"Run: {run.folder}", f"Next: tpm-design report {run.folder}"]
+    allow = " --allow-code" if study.plug_in else ""
+    after = [f"Run: {run.folder}", f"Next: tpm-design report {run.folder}{allow}"]
+    lines = [run.status, *run.result.remarks, *after]
     return "\n\n".join([*parts, "\n".join(lines)])
 
 
@@ -304,11 +309,11 @@ def usable_processors() -> int:
     return len(affinity(0)) if affinity else (os.cpu_count() or 1)
 
 
-def report_runs(runs: Sequence[Path], *, quiet: bool) -> int | None:
+def report_runs(runs: Sequence[Path], *, allow_code: bool, quiet: bool) -> int | None:
     from tpm_design.report import write_report
 
     for folder in runs or [newest_run(RESULTS)]:
-        for path in write_report(folder):
+        for path in write_report(folder, allow_code=allow_code):
             if not quiet:
                 print(path)
     return None

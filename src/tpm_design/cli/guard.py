@@ -40,8 +40,9 @@ def guarded(command: Callable[Arguments, int | None]) -> Callable[Arguments, Non
             complain(_trouble(error))
             code = USAGE
         except Exception as error:
-            complain(_bug_message(error))
-            code = INTERNAL
+            plug_in = _plug_in_to_blame(error)
+            complain(_bug_message(error) if plug_in is None else _plug_in_message(error, plug_in))
+            code = INTERNAL if plug_in is None else USAGE
         raise typer.Exit(code)
 
     return run
@@ -82,12 +83,36 @@ def complain(message: str) -> None:
     print(f"tpm-design: {message}", file=sys.stderr)
 
 
+def _plug_in_to_blame(error: Exception) -> str | None:
+    """Place in a mechanism's own file that an error comes from; None where there is no such file."""
+    # where no such file was loaded, neither was this module
+    if "tpm_design.mechanisms.plug_in" not in sys.modules:
+        return None
+    from tpm_design.mechanisms.plug_in import fault_of_plug_in
+
+    return fault_of_plug_in(error)
+
+
+def _plug_in_message(error: Exception, place: str) -> str:
+    from tpm_design.mechanisms.plug_in import described
+
+    return (
+        f"{place}: the mechanism's formulas fail: {described(error)}\n"
+        f"  Mend the file. The whole story is in {_log(error)}."
+    )
+
+
 def _bug_message(error: Exception) -> str:
+    return (
+        f"This is a bug: {type(error).__name__}: {error}\n"
+        f"  Please report it to the maintainers of tpm-design with the file {_log(error)} and your study."
+    )
+
+
+def _log(error: Exception) -> Path:
+    """A new file with the traceback."""
     with tempfile.NamedTemporaryFile(
         "w", prefix="tpm-design-", suffix=".log", delete=False, encoding="utf-8"
     ) as log:
         traceback.print_exception(error, file=log)
-    return (
-        f"This is a bug: {type(error).__name__}: {error}\n"
-        f"  Please report it to the maintainers of tpm-design with the file {Path(log.name)} and your study."
-    )
+    return Path(log.name)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from tpm_design.arithmetic import FAST_MATH, inner, kernel
+from tpm_design.arithmetic import fast_kernel, inner, kernel
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.velocity import inverse_condition_frobenius, jacobian
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
+@fast_kernel
 def reach_row(geometry, mode, x, y, z, legs, side):  # type: ignore[no-untyped-def]
     """Least leg margin and least mode margin (N,), written in place."""
     for n in range(x.size):
@@ -30,7 +29,7 @@ def reach_row(geometry, mode, x, y, z, legs, side):  # type: ignore[no-untyped-d
         side[n] = least
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)
+@fast_kernel
 def singularity_row(geometry, mode, x, y, z, determinants):  # type: ignore[no-untyped-def]
     """Signed determinants (D, N), written in place."""
     for n in range(x.size):

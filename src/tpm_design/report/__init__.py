@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 
-def write_report(folder: Path) -> tuple[Path, ...]:
+def write_report(folder: Path, *, allow_code: bool = False) -> tuple[Path, ...]:
     """Writes report.md and figures/*.png into a run folder; returns their paths.
 
-    Raises UsageError for a folder that is no run or cannot be written, StudyError for its study.
+    ``allow_code``: whether the Python file of the run's own mechanism may be run. Raises UsageError for a
+    folder that is no run or cannot be written, StudyError or PlugInError for its study.
     """
     # drawing libraries load slowly and the command line shares the words of this room
     from tpm_design.report.write import write_report as write
 
-    return write(folder)
+    return write(folder, allow_code=allow_code)

@@ -46,6 +46,12 @@ def certificate_lines(reported: Reported) -> list[str]:
     if outcome == "refuted":
         sentence = f"{SENTENCES[outcome]} by {machines.removeprefix('for ').replace('every', 'a', 1)}."
     lines = ["## What is proved", "", text(sentence), "", *table(headings, rows), ""]
+    if reported.study.plug_in is not None:
+        return [
+            *lines,
+            f"By the formulas of {code(reported.study.plug_in.name)}; no second implementation "
+            "of them can check the proof.",
+        ]
     return [*lines, f"[{FILE}]({FILE}) can be checked again: {code(f'tpm-design certify --check {FILE}')}."]
 
 

@@ -93,6 +93,8 @@ def _question(reported: Reported) -> list[str]:
     else:
         where = f"{shape_text(problem.region, units)}, {centre_text(problem, units)}"
         lines += ["", f"The useful region is {text(where)}."]
+    if not problem.kind.mode_fields:
+        return lines
     modes = ", ".join(code(label) for label in problem.modes)
     if len(problem.modes) > MOST_LISTED:
         modes = f"any of {len(problem.modes)}"
@@ -305,4 +307,7 @@ def _caveats(reported: Reported) -> list[str]:
 
 def _files(reported: Reported) -> list[str]:
     present = [(name, what) for name, what in FILES if (reported.run.folder / name).is_file()]
+    plug_in = reported.study.plug_in
+    if plug_in is not None:
+        present.append((plug_in.name, "the mechanism's formulas, the user's own"))
     return ["## Files", "", *(f"- [{name}]({name}): {what}" for name, what in present)]

@@ -36,10 +36,11 @@ class Reported:
         return self.best is not None and self.best.evaluation.status == "feasible"
 
 
-def read_reported(folder: Path) -> Reported:
-    """The run in ``folder``, finished or cut short. Raises UsageError or StudyError."""
+def read_reported(folder: Path, *, allow_code: bool = False) -> Reported:
+    """The run in ``folder``, finished or cut short; ``allow_code`` as ``load_study`` takes it. Raises
+    UsageError, StudyError or PlugInError."""
     run = read_run(folder)
-    study = load_study(folder / STUDY)
+    study = load_study(folder / STUDY, allow_code=allow_code)
     return Reported(study, run, run.best or best_entry(study.problem, run.entries))
 
 

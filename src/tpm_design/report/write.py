@@ -12,14 +12,14 @@ from tpm_design.report.reported import read_reported
 REPORT = "report.md"
 
 
-def write_report(folder: Path) -> tuple[Path, ...]:
+def write_report(folder: Path, *, allow_code: bool = False) -> tuple[Path, ...]:
     """Write ``report.md`` and ``figures/*.png`` of the run in ``folder``, finished or cut short, and return
-    their paths, the report first.
+    their paths, the report first. ``allow_code``: whether the run's own mechanism may be run.
 
     Raises UsageError where ``folder`` is no run, its log is damaged or it cannot be written to, and
-    StudyError where its study cannot be used.
+    StudyError or PlugInError where its study cannot be used.
     """
-    reported = read_reported(folder)
+    reported = read_reported(folder, allow_code=allow_code)
     found = pictures(reported)
     try:
         images = write_pictures(folder, found)

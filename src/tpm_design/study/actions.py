@@ -14,7 +14,7 @@ from tpm_design.certificates.document import document, write_document
 from tpm_design.certificates.verdict import Verdict
 from tpm_design.errors import UsageError, did_you_mean
 from tpm_design.problem import Design, Evaluation, evaluate, with_ties
-from tpm_design.runs.folder import RunWriter, create_run_folder, provenance, text_hash
+from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, text_hash
 from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, search
 from tpm_design.runs.rounds import Proving, search_certified
 from tpm_design.runs.search import Entry
@@ -79,6 +79,8 @@ def optimize_study(
     study_text = dump_yaml(study.resolved())
     if output is not None:
         folder = create_run_folder(output, study.name, study.study_hash)
+        if study.plug_in is not None:
+            study.plug_in.write_beside(folder / STUDY)
         writer = RunWriter(folder, study.problem, study.units, study_text)
 
     def record(entry: Entry) -> None:

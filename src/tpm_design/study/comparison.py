@@ -29,11 +29,11 @@ class Comparison:
     studies: Mapping[str, Study]
 
 
-def load_comparison(path: str | Path) -> Comparison | None:
+def load_comparison(path: str | Path, *, allow_code: bool = False) -> Comparison | None:
     """The studies of a file with ``architectures:``, None where the file is one study. Each architecture is
     a part of a study (``mechanism``, and whatever it does not share); the rest is said once for all.
 
-    Raises StudyError: what is wrong, in which line, what to do.
+    Raises StudyError: what is wrong, in which line, what to do. ``allow_code`` as for ``load_study``.
     """
     document = read_document(Path(path))
     if KEY not in document.data:

@@ -82,8 +82,8 @@ def number(text: str) -> int | float | None:
     return None
 
 
-def read_text(path: Path, largest: int = LARGEST_FILE, *, what: str = "study") -> str:
-    """The text of a UTF-8 file of at most ``largest`` bytes. Raises StudyError."""
+def read_bytes(path: Path, largest: int = LARGEST_FILE, *, what: str = "study") -> bytes:
+    """The content of a file of at most ``largest`` bytes. Raises StudyError."""
     try:
         if path.is_dir():
             raise StudyError(
@@ -110,6 +110,12 @@ def read_text(path: Path, largest: int = LARGEST_FILE, *, what: str = "study") -
             where=where(path),
             remedy="Shorten it, or split it in several.",
         )
+    return raw
+
+
+def read_text(path: Path, largest: int = LARGEST_FILE, *, what: str = "study") -> str:
+    """The text of a UTF-8 file of at most ``largest`` bytes. Raises StudyError."""
+    raw = read_bytes(path, largest, what=what)
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -144,6 +144,10 @@ def _translate(details: ErrorDetails, document: Document, faults: Faults) -> Non
 def _pattern_remedy(place: Place) -> str:
     if place[-1:] == ("name",):
         return NAME_REMEDY
+    if place[-1:] == ("file",):
+        return "Name a Python file beside the study, such as my_robot.py."
+    if place[-1:] == ("sha256",):
+        return "Write the 64 hexadecimal digits of the file's SHA-256, or remove it."
     return "Begin with a letter or digit; use at most 120 letters, digits, spaces and . , : ( ) = + / % - _."
 
 

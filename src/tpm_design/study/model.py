@@ -23,6 +23,7 @@ LARGEST = 1e15
 SMALLEST = 1e-15
 LARGEST_GRID = 1_000_000
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
+PYTHON_FILE = r"^[^/\\].*\.py$"
 NAME_REMEDY = "Use 1 to 64 letters, digits, '.', '_' or '-', a letter or digit first: it names a folder."
 
 
@@ -172,12 +173,26 @@ ModeValue = Annotated[
 
 
 class MechanismModel(Strict):
-    """``mechanism:``"""
+    """``mechanism:``, a ``type`` known here or the Python ``file`` that defines it."""
 
-    type: Text
+    type: Text | None = None
+    file: Annotated[str, Field(strict=True, pattern=PYTHON_FILE)] | None = None
+    sha256: Annotated[str, Field(strict=True, pattern=r"^[0-9a-f]{64}$")] | None = None
     parameters: dict[Text, ParameterQuantity]
     mode: ModeValue | None = None
     limits: dict[Text, LimitValue] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _one_source(self) -> MechanismModel:
+        if self.type is None and self.file is None:
+            raise fault(
+                "`type` is missing", "Add `type: …`, or `file: my_robot.py` for a mechanism of yours."
+            )
+        if self.type is not None and self.file is not None:
+            raise fault("type and file exclude each other", "Keep the one that names the mechanism.")
+        if self.sha256 is not None and self.file is None:
+            raise fault("sha256 belongs to a file", "Remove it.")
+        return self
 
 
 class Center(Strict):

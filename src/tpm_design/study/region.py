@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import csv
 import math
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 from tpm_design.errors import StudyError
+from tpm_design.study.beside import file_beside
 from tpm_design.study.document import number, read_text, where
 from tpm_design.study.faults import Faults, shown
 from tpm_design.study.model import (
@@ -56,24 +57,7 @@ def read_region(model: AnyRegion, units: Units, folder: Path, faults: Faults) ->
 
 def _read_points(name: str, folder: Path, faults: Faults) -> tuple[Triple, ...]:
     """Poses from a CSV file in the study's folder: x, y, z in the study's length unit, heading optional."""
-    pure = PurePosixPath(name)
-    if pure.is_absolute() or ".." in pure.parts or "\\" in name or ":" in name:
-        faults.stop(
-            ("region", "file"),
-            f"the file {shown(name)} is outside the study's folder",
-            "Put it beside the study and name it relative to the study, with '/'.",
-        )
-    path = folder / pure
-    try:
-        inside = path.resolve().is_relative_to(folder.resolve())
-    except (OSError, ValueError, RuntimeError):  # a loop of links, a name too long
-        inside = False
-    if not inside:
-        faults.stop(
-            ("region", "file"),
-            f"the link {shown(name)} leads out of the study's folder",
-            "Put the file itself beside the study.",
-        )
+    path = file_beside(name, folder, ("region", "file"), faults)
     try:
         text = read_text(path, what="points")
     except StudyError as error:

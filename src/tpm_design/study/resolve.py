@@ -18,12 +18,14 @@ from tpm_design.study.model import (
     BoxModel,
     Center,
     CertifyModel,
+    MechanismModel,
     OptimizerModel,
     Range,
     SphereModel,
     StudyModel,
 )
 from tpm_design.study.plain import plain
+from tpm_design.study.plug_in import PlugIn, read_plug_in
 from tpm_design.study.quantities import interval
 from tpm_design.study.region import read_region
 from tpm_design.study.registries import Registries, registries
@@ -40,8 +42,12 @@ from tpm_design.study.sweep import SweepReader
 from tpm_design.units import Units, si_unit
 
 
-def load_study(path: str | Path) -> Study:
-    """Reads and checks a study file. Raises StudyError: what is wrong, in which line, what to do."""
+def load_study(path: str | Path, *, allow_code: bool = False) -> Study:
+    """Reads and checks a study file. Raises StudyError: what is wrong, in which line, what to do.
+
+    A study may name a Python file as its mechanism. The file is run only if ``allow_code``, else the study is
+    refused; what is wrong in the file itself is a PlugInError.
+    """
     document = read_document(Path(path))
     if "architectures" in document.data:
         Faults(document).stop(
@@ -49,20 +55,14 @@ def load_study(path: str | Path) -> Study:
             "this file compares several architectures",
             "Use it with optimize or validate; a run of one of them is a study for the other commands.",
         )
-    return resolve(document, parse(document), registries())
+    return resolve(document, parse(document), registries(), allow_code=allow_code)
 
 
-def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
-    """Checks what the names mean and fills in the rest. Raises StudyError."""
+def resolve(document: Document, model: StudyModel, known: Registries, *, allow_code: bool = False) -> Study:
+    """Checks what the names mean and fills in the rest. Raises StudyError, PlugInError."""
     faults = Faults(document)
     units = Units(model.units.length, model.units.angle)
-    kind = known.mechanisms.get(model.mechanism.type)
-    if kind is None:
-        faults.stop(
-            ("mechanism", "type"),
-            f"there is no mechanism {shown(model.mechanism.type)}",
-            did_you_mean(model.mechanism.type, known.mechanisms),
-        )
+    kind, plug_in = _kind(model.mechanism, document, known, faults, allow_code=allow_code)
     region = model.region
     center = region.center if region else None
     parameters = read_parameters(model.mechanism, kind, units, faults)
@@ -118,7 +118,9 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
         "name": model.name,
         "units": model.units,
         "mechanism": {
-            "type": kind.name,
+            "type": model.mechanism.type,
+            "file": None if plug_in is None else plug_in.name,
+            "sha256": None if plug_in is None else plug_in.sha256,
             "parameters": {
                 name: model.mechanism.parameters[name]
                 for name in kind.parameter_names()
@@ -144,8 +146,27 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
         optimizer=optimizer,
         certification=certification,
         sweep=sweep,
+        plug_in=plug_in,
         resolved_json=json.dumps(plain(resolved), ensure_ascii=False, allow_nan=False),
     )
+
+
+def _kind(
+    model: MechanismModel, document: Document, known: Registries, faults: Faults, *, allow_code: bool
+) -> tuple[MechanismKind, PlugIn | None]:
+    """The mechanism by its name, or from its file."""
+    if model.file is not None:
+        plug_in, kind = read_plug_in(
+            model.file, model.sha256, document.path.parent, known.mechanisms, faults, allow_code=allow_code
+        )
+        return kind, plug_in
+    name = str(model.type)
+    if name not in known.mechanisms:
+        remedy = did_you_mean(name, known.mechanisms)
+        if name.endswith(".py"):
+            remedy = f"Write `file: {name}` for a mechanism in a file of yours."
+        faults.stop(("mechanism", "type"), f"there is no mechanism {shown(name)}", remedy)
+    return known.mechanisms[name], None
 
 
 def _isotropic(model: StudyModel) -> bool:

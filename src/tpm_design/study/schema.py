@@ -8,7 +8,7 @@ from typing import Any
 
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.metrics.base import Metric, Option
-from tpm_design.study.model import StudyModel
+from tpm_design.study.model import PYTHON_FILE, StudyModel
 from tpm_design.study.registries import Registries, registries
 
 Schema = dict[str, Any]
@@ -59,8 +59,21 @@ def _when(key: str, value: str, then: Schema) -> Schema:
 
 
 def _mechanisms(definition: Schema, known: Registries) -> None:
-    """Type by name; parameters, mode fields and limits by type."""
-    definition["properties"]["type"]["enum"] = sorted(known.mechanisms)
+    """Type by name; parameters, mode fields and limits by type. What a file defines is not known here."""
+    properties = definition["properties"]
+    properties["type"] = {"enum": sorted(known.mechanisms)}
+    properties["file"] = {
+        "type": "string",
+        "pattern": PYTHON_FILE,
+        "description": "a Python file beside the study that defines the mechanism; needs --allow-code",
+    }
+    properties["sha256"] = {
+        "type": "string",
+        "pattern": "^[0-9a-f]{64}$",
+        "description": "the SHA-256 that the file must have",
+    }
+    definition["oneOf"] = [{"required": ["type"]}, {"required": ["file"]}]
+    definition["dependentRequired"] = {"sha256": ["file"]}
     definition["allOf"] = [
         _when("type", name, {"properties": _mechanism(kind, definition)})
         for name, kind in known.mechanisms.items()

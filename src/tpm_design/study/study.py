@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tpm_design.errors import UsageError
 from tpm_design.problem import Evaluation, Problem
+from tpm_design.study.plug_in import PlugIn
 from tpm_design.study.sweep import Sweep
 from tpm_design.units import Units
 
@@ -41,7 +42,8 @@ class Certification:
 class Study:
     """A validated study. ``problem`` is in SI units; ``resolved()`` in the study's own.
 
-    ``certification``: None where the study asks for no proof. Studies that ask the same are equal, wherever
+    ``certification``: None where the study asks for no proof. ``plug_in``: the mechanism's own file, None
+    where the mechanism is one that is registered. Studies that ask the same are equal, wherever
     their files lie.
     """
 
@@ -52,6 +54,7 @@ class Study:
     optimizer: OptimizerSettings
     certification: Certification | None
     sweep: Sweep | None
+    plug_in: PlugIn | None
     resolved_json: str = field(repr=False)
 
     def resolved(self) -> dict[str, Any]:
