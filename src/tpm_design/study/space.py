@@ -237,6 +237,12 @@ def free_center(
 ) -> Center:
     """``center: free`` written out: as far as the mechanism can reach, on the octant's side of each plane."""
     reach = units.from_si(kind.farthest_reach(ranges), "m")
+    if math.isinf(reach):
+        faults.stop(
+            ("region", "center"),
+            "how far the mechanism reaches does not follow from its parameters alone",
+            "Give `center: {x: {min: …, max: …}, y: …, z: …}`.",
+        )
     if not (math.isfinite(reach) and reach > 0):
         faults.stop(("region", "center"), "the mechanism reaches nothing", "Give larger lengths.")
     # four digits, rounded up: still a bound, and one that can be read
