@@ -49,6 +49,7 @@ from tpm_design.checker.mechanisms.mechanism import (
 from tpm_design.checker.mechanisms.two_bars import Chain, End, chain
 
 ONE, TWO = arb(1), arb(2)
+SIZES = ("delta", "f", "r", "k")
 JOINTS = ("theta1", "theta2", "theta3", "theta4")
 
 
@@ -83,7 +84,7 @@ class Uru(Configuration):
 
     def _leg(self, limb: int) -> Leg:
         p, p_j, p_k = (self.pose[(limb + step) % 3] for step in LIMBS)
-        delta, f, r, k = (self.size(name, limb) for name in ("delta", "f", "r", "k"))
+        delta, f, r, k = (self.variables[f"{name}{limb + 1}"] for name in SIZES)
         alpha = p + delta
         along_j, along_k, beta = direction(p_j, p_k)
         if self.middle is not None:
