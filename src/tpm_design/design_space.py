@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.problem import CENTRE, Design, Variable
+from tpm_design.problem import CENTRE, Design, Variable, with_ties
 
 FloatArray = NDArray[np.float64]
 
@@ -16,11 +16,12 @@ FloatArray = NDArray[np.float64]
 @dataclass(frozen=True)
 class DesignSpace:
     """Free quantities in order, and what is fixed. ``octants``: mode label → signs (±1, 0) of its octant,
-    for the quantities that follow it."""
+    for the quantities that follow it. ``ties``: as in ``Problem``."""
 
     variables: tuple[Variable, ...]
     fixed: Mapping[str, float | str]
     octants: Mapping[str, tuple[float, float, float]]
+    ties: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def levels(self) -> tuple[int, ...]:
@@ -37,7 +38,7 @@ class DesignSpace:
                 design[variable.name] = variable.values[min(count - 1, int(share * count))]
             else:
                 design[variable.name] = variable.lower + share * (variable.upper - variable.lower)
-        return self._mirrored(design)
+        return with_ties(self.ties, self._mirrored(design))
 
     def point(self, design: Design) -> FloatArray:
         """The unit-cube point (n,) of a design; discrete values at the centre of their interval."""
@@ -67,9 +68,8 @@ class DesignSpace:
     def holding_discrete(self, design: Design) -> DesignSpace:
         """The space of the continuous variables, the discrete ones fixed at the design's values."""
         chosen = {v.name: design[v.name] for v in self.variables if v.values}
-        return DesignSpace(
-            tuple(v for v in self.variables if not v.values), {**self.fixed, **chosen}, self.octants
-        )
+        continuous = tuple(v for v in self.variables if not v.values)
+        return replace(self, variables=continuous, fixed={**self.fixed, **chosen})
 
     def near(self, design: Design, share: float) -> DesignSpace:
         """The space cut to within ``share`` of each continuous range around a design."""

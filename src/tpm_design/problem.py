@@ -79,7 +79,8 @@ class Sample:
 @dataclass(frozen=True)
 class Problem:
     """What a study asks. ``modes``: label → sign strings, ``{"+++ +-+": {"octant": …, "elbows": …}}``.
-    ``samples``: what every design must hold besides; a design's metrics are those of its exact machine."""
+    ``samples``: what every design must hold besides; a design's metrics are those of its exact machine.
+    ``ties``: parameters that take the value of another one, by name: neither fixed nor free."""
 
     kind: MechanismKind
     fixed: Mapping[str, float | str]
@@ -92,6 +93,7 @@ class Problem:
     record: tuple[Goal, ...]
     accuracy: Accuracy = Accuracy()
     samples: tuple[Sample, ...] = ()
+    ties: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,11 @@ class Evaluation:
     status: Literal["feasible", "infeasible", "failed"]
     reason: str
     seconds: float
+
+
+def with_ties(ties: Mapping[str, str], design: Design) -> Design:
+    """The design with every tied parameter at the value of the one it names."""
+    return {**design, **{name: design[source] for name, source in ties.items()}}
 
 
 def evaluate(problem: Problem, design: Design) -> Evaluation:

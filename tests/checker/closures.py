@@ -57,11 +57,12 @@ def cylindrical(slide: bool, idle: bool) -> LimbAt:
         q = float(s @ (pose + platform - base)) / float(s @ d)
         rho = float(np.linalg.norm(pose + platform - base - q * d))
         f, r = size["f"], size["r"]
+        share = abs(float(s @ d))  # how fast the pose nears a bound of reach
         cosine = (f * f + r * r - rho * rho) / (2 * f * r)
         interior = math.acos(min(1.0, max(-1.0, cosine)))
         normal = unit(np.cross(s, axis(size["idle_azimuth"], size["idle_elevation"]))) if idle else s
         return Limb(
-            q, s, 1.0, math.sin(interior), normal, (f + r - rho, rho - abs(f - r)),
+            q, s, 1.0, math.sin(interior), normal, (share * (f + r - rho), share * (rho - abs(f - r))),
             {"stroke": q, "elbow": interior},
         )  # fmt: skip
 
@@ -121,7 +122,7 @@ def linear_delta(size: Sizes, limb: int, sign: int, pose: Vector) -> Limb:
 
 def orthoglide(size: Sizes, limb: int, sign: int, pose: Vector) -> Limb:
     rail = np.eye(3)[limb]
-    q, s, reach = on_rail(np.zeros(3), rail, pose, size["L"], sign < 0)
+    q, s, reach = on_rail(np.zeros(3), rail, pose + size["d"] * rail, size["L"], sign < 0)
     along = abs(float(s @ rail))
     return Limb(q, s, 1.0, along, rail, (reach,), {"stroke": q, "swing": math.acos(min(1.0, along))})
 

@@ -16,6 +16,7 @@ from tpm_design.checker.claims import Machine
 from tpm_design.checker.mechanisms import MECHANISMS
 from tpm_design.checker.mechanisms.angles import exact_angle
 from tpm_design.checker.mechanisms.configuration import LIMBS, Machines
+from tpm_design.checker.mechanisms.mechanism import ANGLE, LENGTH, RATIO
 from tpm_design.checker.proof import all_positive, graded, natural, out_of_reach, proved, spans_of
 from tpm_design.checker.regions import Box, Domain, Region
 from tpm_design.checker.statements import (
@@ -32,11 +33,25 @@ from tpm_design.checker.statements import (
     Statement,
     Transmission,
 )
+from tpm_design.mechanisms import mechanism_kind
+from tpm_design.workspace.indices import (
+    CONDITION_2,
+    CONDITION_FROBENIUS,
+    DETERMINANT,
+    FASTEST,
+    LEGS,
+    SENSITIVITY,
+    SERIAL,
+    SLOWEST,
+    TRANSMISSION,
+    Index,
+    index_values,
+)
 
 NEW = ("crr", "prrr", "crrr", "delta", "linear_delta", "orthoglide")
 QUARTER = math.pi / 2
 TOLERANCES = {
-    "orthoglide": {"L": 1e-3},
+    "orthoglide": {"L": 1e-3, "d": 1e-3},
     "linear_delta": {"R": 1e-3, "l2": 5e-4, "rail": 1e-3},
     "delta": {"w": 1e-3, "L": 1e-3, "l3": 1e-3},
 }
@@ -55,7 +70,7 @@ def about(random: np.random.Generator, *middles: float, spread: float = 0.1) -> 
 def random_parameters(name: str, random: np.random.Generator) -> dict[str, tuple[float, float, float]]:
     """Near the usual arrangement, each limb by itself."""
     if name == "orthoglide":
-        return {"L": about(random, 1, 1, 1)}
+        return {"L": about(random, 1, 1, 1), "d": about(random, 0, 0, 0)}
     if name == "linear_delta":
         return {
             "R": about(random, 0.5, 0.5, 0.5),
@@ -314,7 +329,9 @@ def metrics_at(name: str, plain: closures.Machine, pose: np.ndarray) -> Values:
     outputs = [
         abs(np.linalg.det(a)) / np.linalg.norm(np.cross(a[(i + 1) % 3], a[(i + 2) % 3])) for i in LIMBS
     ]
-    inputs = [1.0] if name in ("crr", "prrr", "crrr") else [limb.serial for limb in limbs]
+    inputs = [limb.serial for limb in limbs]
+    if name in ("crr", "prrr", "crrr"):
+        inputs = [abs(plain.b(i, pose)) for i in LIMBS]
     return Values(
         condition=values[2] / values[0],
         frobenius=float(3 / (np.linalg.norm(jacobian) * np.linalg.norm(np.linalg.inv(jacobian)))),
@@ -358,6 +375,85 @@ def test_a_statement_holds_up_to_the_value_at_a_pose_and_no_further(name: str) -
             assert all_positive(Locus(determinant, 0.1), machines, spans)
             assert not all_positive(Determinant(determinant, sign, abs(value) * (1 + 1e-9)), machines, spans)
             assert not all_positive(Determinant(determinant, -sign, 0.0), machines, spans)
+
+
+INDICES = {
+    "condition": Index(CONDITION_2),
+    "frobenius": Index(CONDITION_FROBENIUS),
+    "slowest": Index(SLOWEST),
+    "fastest": Index(FASTEST),
+    "sensitivity": Index(SENSITIVITY),
+    "transmission": Index(TRANSMISSION),
+    "serial": Index(SERIAL),
+    "reach": Index(LEGS),
+}
+
+
+@pytest.mark.parametrize("name", NEW)
+def test_statements_hold_up_to_the_values_of_the_package_and_no_further(name: str) -> None:
+    """The package computes them by other code, which makes the certificates."""
+    random = np.random.default_rng(8)
+    for _ in range(4):
+        machine, _, poses = random_case(name, random)
+        machine = Machine(machine.mechanism, machine.parameters, {}, {}, machine.mode)
+        built = mechanism_kind(name).build(machine.parameters, {})
+        mode = built.mode_of(machine.mode)
+        machines = machine.within_tolerance()
+        for pose in poses[:3]:
+            spans = spans_of(machines, around(pose, 0.0))
+            for title, index in INDICES.items():
+                value = float(index_values(built.geometry, mode.signs, index, pose[None])[0])
+                rising = title not in ("fastest", "sensitivity")
+                within, beyond = value * (1 - 1e-9), value * (1 + 1e-9)
+                statement = STATEMENTS[title]
+                assert all_positive(statement(within if rising else beyond), machines, spans), title
+                assert not all_positive(statement(beyond if rising else within), machines, spans), title
+            for part, determinant in enumerate(machine.mechanism.determinants):
+                index = Index(DETERMINANT, part=part)
+                value = float(index_values(built.geometry, mode.signs, index, pose[None])[0])
+                found = natural(machines, spans).unit_determinant(determinant).value
+                assert found.overlaps(arb(value, 1e-13))
+
+
+@pytest.mark.parametrize("name", NEW)
+def test_parameters_limits_and_modes_are_those_of_the_package(name: str) -> None:
+    known, kind = MECHANISMS[name], mechanism_kind(name)
+    powers = {"length": LENGTH, "angle": ANGLE, "ratio": RATIO}
+    assert {p.name: (p.powers, p.domain, p.default) for p in known.parameters} == {
+        p.name: (powers[p.dimension], p.domain, p.default) for p in kind.parameters
+    }
+    assert {n: (limit.form, limit.powers) for n, limit in known.limits.items()} == {
+        limit.name: (limit.kind, powers[limit.dimension]) for limit in kind.limits
+    }
+    assert [(f.name, f.any_allowed) for f in known.mode] == [
+        (f.name, f.any_allowed) for f in kind.mode_fields
+    ]
+    assert (tuple(known.drives), known.determinants) == (kind.drives, kind.determinants)
+    assert known.transmission_drive == kind.transmission_drive
+
+
+@pytest.mark.parametrize("name", NEW)
+def test_limits_are_those_of_the_package(name: str) -> None:
+    random = np.random.default_rng(9)
+    told = {True: 0, False: 0}
+    for _ in range(12):
+        free = random_case(name, random)
+        limits: dict[str, Any] = {}
+        for limit, form in MECHANISMS[name].limits.items():
+            values = [limb.limited.get(limit, 0) for pose in free.poses for limb in free.plain.limbs(pose)]
+            low, high = np.quantile(values, [0.03, 0.97]).tolist()
+            if limit not in ("fold", "link_radius"):
+                limits[limit] = (low - 1e-3, high + 1e-3) if form.form == "range" else high + 1e-3
+        machine = Machine(free.machine.mechanism, free.machine.parameters, {}, limits, free.machine.mode)
+        built = mechanism_kind(name).build(machine.parameters, limits)
+        mode, machines = built.mode_of(machine.mode), machine.within_tolerance()
+        for pose in free.poses[:6]:
+            reach = float(built.margins(pose, mode)["reach"][0])
+            if abs(reach) > 1e-9:
+                spans = spans_of(machines, around(pose, 0.0))
+                assert all_positive(Reach(0.0), machines, spans) == (reach > 0.0)
+                told[reach > 0.0] += 1
+    assert min(told.values()) > 2, told
 
 
 @pytest.mark.parametrize("name", NEW)
@@ -536,8 +632,8 @@ def test_parallel_slides_of_a_prrr_carry_its_workspace_along() -> None:
 
 
 def reach_at(pose: tuple[float, float, float]) -> list[float]:
-    """1 − |p − p_i (1, 1, 1)| of each limb: its S d with S = √3 p_i."""
-    return [1.0 - math.dist(pose, (pose[i],) * 3) for i in LIMBS]
+    """1 − |p − p_i (1, 1, 1)| of each limb, its S d with S = √3 p_i, times |s·d|."""
+    return [(1.0 - math.dist(pose, (pose[i],) * 3)) / math.sqrt(3) for i in LIMBS]
 
 
 def test_coplanar_axes_prove_nothing() -> None:

@@ -1,70 +1,120 @@
-"""What every registered metric must do, without naming any."""
+"""What every registered metric must do with every mechanism, without naming any."""
 
 from __future__ import annotations
 
 import math
+from functools import cache
+from typing import Any
 
+import numpy as np
 import pytest
 
 from tpm_design.mechanisms import MECHANISMS
+from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.metrics import METRICS
 from tpm_design.metrics.base import UNDEFINED, Metric
-from tpm_design.problem import Goal, Problem, design_context, evaluate
+from tpm_design.problem import Design, Evaluation, Goal, Problem, design_context, evaluate
 from tpm_design.units import Units, unit_for
 from tpm_design.workspace.regions import Box
 
-KIND = next(iter(MECHANISMS.values()))
-REGION = Box((0.1, 0.1, 0.1))
+FAR = 10.0
 
 
-def goal_of(metric: Metric) -> Goal:
-    required = {
+def goal_of(metric: Metric, kind: MechanismKind) -> Goal:
+    options: dict[str, Any] = {
         option.name: 0.5 * (option.minimum + option.maximum) for option in metric.options if option.required
     }
-    return Goal(metric, metric.name, required)
+    if metric.option("drive"):
+        options["drive"] = metric.drives(kind)[0]
+    return Goal(metric, metric.name, options)
 
 
-def problem_of(*goals: Goal) -> Problem:
-    modes = {"+": {field.name: "+" * field.length for field in KIND.mode_fields}}
-    return Problem(KIND, {}, (), modes, {}, REGION, (), (), goals)
+def meaningful(kind: MechanismKind) -> list[Metric]:
+    return [metric for metric in METRICS.values() if metric.applies(kind)]
 
 
-def design_at(centre: float) -> dict[str, float | str]:
-    return {**KIND.example, "center_x": centre, "center_y": centre, "center_z": centre, "mode": "+"}
+def problem_of(kind: MechanismKind, *goals: Goal, constraints: tuple[Goal, ...] = ()) -> Problem:
+    modes = {"+": {field.name: "+" * field.length for field in kind.mode_fields}}
+    edge = 0.06 * kind.build(kind.example, {}).reach_radius()
+    return Problem(kind, {}, (), modes, {}, Box((edge, edge, edge)), (), constraints, goals)
 
 
-@pytest.fixture(params=list(METRICS.values()), ids=lambda metric: metric.name)
-def metric(request: pytest.FixtureRequest) -> Metric:
-    found: Metric = request.param
+@cache
+def good_centre(kind_name: str) -> np.ndarray:
+    """A pose of the example well within reach and far from singularities, seeded."""
+    kind = MECHANISMS[kind_name]
+    machine = kind.build(kind.example, {})
+    mode = machine.mode_of({field.name: "+" * field.length for field in kind.mode_fields})
+    radius = machine.reach_radius()
+    poses = np.random.default_rng(3).uniform(-radius, radius, (20000, 3))
+    margins = machine.margins(poses, mode)
+    scores = [margins["reach"] / radius, margins["serial"]]
+    scores += [np.abs(margins[name]) for name in kind.determinants]
+    around = [
+        machine.ik(poses + 0.05 * radius * step, mode)[:, 0] for step in np.vstack([np.eye(3), -np.eye(3)])
+    ]
+    worst = np.where(
+        np.isnan(around).any(axis=0), -np.inf, np.nan_to_num(np.min(scores, axis=0), nan=-np.inf)
+    )
+    return np.asarray(poses[worst.argmax()])
+
+
+def design_at(kind: MechanismKind, factor: float) -> Design:
+    x, y, z = (float(value) for value in factor * good_centre(kind.name))
+    return {**kind.example, "center_x": x, "center_y": y, "center_z": z, "mode": "+"}
+
+
+@pytest.fixture(
+    params=[
+        pytest.param(kind, id=kind.name, marks=pytest.mark.xdist_group(kind.name))
+        for kind in MECHANISMS.values()
+    ]
+)
+def kind(request: pytest.FixtureRequest) -> MechanismKind:
+    found: MechanismKind = request.param
     return found
 
 
+@pytest.mark.parametrize("metric", METRICS.values(), ids=lambda metric: metric.name)
 def test_every_declaration_is_complete(metric: Metric) -> None:
     assert metric.description
     assert metric.source
     assert metric.scale > 0.0
-    Units().name(unit_for(metric.unit, KIND.actuator_unit))
     for option in metric.options:
         assert option.description
         assert option.kind != "choice" or option.default in option.choices
 
 
-def test_every_metric_of_a_good_design_is_a_finite_number_with_an_error(metric: Metric) -> None:
-    result = evaluate(problem_of(goal_of(metric)), design_at(0.15))
+def test_every_metric_means_something_for_a_mechanism_and_has_a_unit(kind: MechanismKind) -> None:
+    for metric in meaningful(kind):
+        Units().name(unit_for(metric.unit, kind.actuator_unit))
+        assert metric.drives(kind)
+
+
+@cache
+def good_evaluation(kind_name: str) -> Evaluation:
+    kind = MECHANISMS[kind_name]
+    goals = [goal_of(metric, kind) for metric in meaningful(kind)]
+    return evaluate(problem_of(kind, *goals), design_at(kind, 1.0))
+
+
+def test_every_metric_of_a_good_design_is_a_finite_number_with_an_error(kind: MechanismKind) -> None:
+    result = good_evaluation(kind.name)
     assert result.status == "feasible", result.reason
-    assert math.isfinite(result.metrics[metric.name])
-    assert 0.0 <= result.errors[metric.name] < 0.2 * max(1.0, abs(result.metrics[metric.name]))
+    for metric in meaningful(kind):
+        value, error = result.metrics[metric.name], result.errors[metric.name]
+        assert math.isfinite(value), metric.name
+        assert 0.0 <= error < 0.2 * max(1.0, abs(value)), metric.name
 
 
-def test_out_of_reach_is_said_or_measured_never_nan_in_silence(metric: Metric) -> None:
-    goal = goal_of(metric)
-    problem = problem_of(goal)
-    context = design_context(problem, design_at(3.0))
-    options = {option.name: goal.options.get(option.name, option.default) for option in metric.options}
-    measurement = metric.compute(context, options)
-    assert math.isfinite(measurement.value) or measurement.notes[UNDEFINED]
-    bounded = Goal(metric, metric.name, goal.options, minimum=-1e9, maximum=1e9)
-    constrained = Problem(KIND, {}, (), problem.modes, {}, REGION, (), (bounded,), ())
-    result = evaluate(constrained, design_at(3.0))
-    assert math.isfinite(result.violation)
-    assert (result.violation > 0.0) == (UNDEFINED in measurement.notes)
+def test_out_of_reach_is_said_or_measured_never_nan_in_silence(kind: MechanismKind) -> None:
+    for metric in meaningful(kind):
+        goal = goal_of(metric, kind)
+        context = design_context(problem_of(kind, goal), design_at(kind, FAR))
+        options = {option.name: goal.options.get(option.name, option.default) for option in metric.options}
+        measurement = metric.compute(context, options)
+        assert math.isfinite(measurement.value) or measurement.notes[UNDEFINED], metric.name
+        bounded = Goal(metric, metric.name, goal.options, minimum=-1e9, maximum=1e9)
+        result = evaluate(problem_of(kind, constraints=(bounded,)), design_at(kind, FAR))
+        assert math.isfinite(result.violation)
+        assert (result.violation > 0.0) == (UNDEFINED in measurement.notes), metric.name

@@ -26,7 +26,7 @@ def distance(a, b, c, d):  # type: ignore[no-untyped-def]
 
 @njit
 def between_chains(a, b, c, d, e, f):  # type: ignore[no-untyped-def]
-    return segments.chain_distance(a, b, c, d, e, f)
+    return segments.chain_distance((a, b, c), (d, e, f))
 
 
 def expected(a: Point, b: Point, c: Point, d: Point) -> float:

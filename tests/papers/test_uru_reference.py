@@ -10,7 +10,7 @@ import pytest
 from numba import njit
 
 from tpm_design.mechanisms import equations, mechanism
-from tpm_design.mechanisms.uru import Uru
+from tpm_design.mechanisms.uru import Uru, joint_angles
 
 Triple = tuple[float, float, float]
 
@@ -63,7 +63,7 @@ def velocity_at(geometry, signs, motor, x, y, z):  # type: ignore[no-untyped-def
 
 @njit
 def angles_at(geometry, signs, x, y, z):  # type: ignore[no-untyped-def]
-    return equations.joint_angles(geometry, signs, x, y, z)
+    return joint_angles(geometry, signs, x, y, z)
 
 
 def machine_of(case: Case) -> Uru:

@@ -5,7 +5,7 @@ from tpm_design.arithmetic import kernel_cache  # noqa: F401  (before Numba)
 # isort: split
 from tpm_design.arithmetic.compilation import FAST_MATH, inlined, inner, kernel
 from tpm_design.arithmetic.dual import Dual, variables
-from tpm_design.arithmetic.formula import formula
+from tpm_design.arithmetic.formula import derived, formula
 from tpm_design.arithmetic.functions import (
     arctangent2,
     cosine,
@@ -27,6 +27,7 @@ __all__ = [
     "Interval",
     "arctangent2",
     "cosine",
+    "derived",
     "direction",
     "direction_cosine",
     "formula",

@@ -31,6 +31,8 @@ from numba.extending import overload
 
 Implementation = TypeVar("Implementation", bound=Callable[..., Any])
 
+_implemented: dict[Callable[..., Any], set[type]] = {}
+
 
 def involves_interval(kind: Any) -> bool:
     """Whether a Numba type is an interval or holds one, at any depth of tuples and duals."""
@@ -45,7 +47,20 @@ def formula(stub: Callable[..., Any], geometry_class: type) -> Callable[[Impleme
 
     The implementation has the stub's parameters, the geometry first. It is returned unchanged.
     """
+    _implemented.setdefault(stub, set()).add(geometry_class)
+    return _registered(stub, lambda given: given is geometry_class)
 
+
+def derived(stub: Callable[..., Any]) -> Callable[[Implementation], Implementation]:
+    """Register the decorated function as ``stub`` for every geometry class that has no formula of its own."""
+    return _registered(
+        stub, lambda given: given is not None and given not in _implemented.setdefault(stub, set())
+    )
+
+
+def _registered(
+    stub: Callable[..., Any], serves: Callable[[type | None], bool]
+) -> Callable[[Implementation], Implementation]:
     parameters = list(inspect.signature(stub).parameters)
 
     def register(implementation: Implementation) -> Implementation:
@@ -55,7 +70,7 @@ def formula(stub: Callable[..., Any], geometry_class: type) -> Callable[[Impleme
             )
 
         def select(strict: bool, arguments: tuple[Any, ...]) -> Implementation | None:
-            if getattr(arguments[0], "instance_class", None) is not geometry_class:
+            if not serves(getattr(arguments[0], "instance_class", None)):
                 return None
             return implementation if any(map(involves_interval, arguments)) == strict else None
 

@@ -165,12 +165,10 @@ def _bound(goal: Goal) -> tuple[float, bool]:
             raise NoProofError(
                 f"{goal.metric.name} is proved in its good direction only, and this bound asks for less"
             )
-        if wanted < 0.0:
-            raise NoProofError("a bound below 0 has no proof here: ask for 0 or more")
     bound = goal.minimum if goal.minimum is not None else goal.maximum
     if bound is not None and bound < 0.0:
         # statements square their bounds, and a region has no surroundings of negative width
-        raise NoProofError("a bound below 0 has no proof here")
+        raise NoProofError("a bound below 0 has no proof here: ask for 0 or more")
     if goal.metric.name == "coverage" and bound is not None and bound > 1.0:
         raise NoProofError("coverage is never more than 1")
     return float(bound if bound is not None else 0.0), goal.maximum is not None

@@ -6,13 +6,15 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from tpm_design.certificates.demands import Demand
 from tpm_design.errors import ParameterError
 from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Problem, offset_mechanism
-from tpm_design.workspace.indices import REACH, Index, index_values
+from tpm_design.workspace.indices import index_values
 
 Parameters = Mapping[str, tuple[float, ...]]
 Pose = tuple[float, float, float]
@@ -50,7 +52,7 @@ def slack_of(demand: Demand, context: Context) -> tuple[float, Pose | None]:
     extreme = context.least(demand.index(kind))
     slack = demand.sense * (demand.sign * extreme.value - demand.bound)
     if demand.kind == "reach":
-        inside = context.least(Index(REACH))
+        inside = context.reach
         if inside.value < slack:
             return inside.value, inside.pose
     return slack, extreme.pose
@@ -112,8 +114,6 @@ def _slack_at(demand: Demand, context: Context, pose: Pose | None) -> Callable[[
     index = demand.index(context.mechanism.kind)
 
     def at(machine: Mechanism) -> float:
-        import numpy as np
-
         value = index_values(machine.geometry, context.mode.signs, index, np.array([pose]))[0]
         # index values are signed so that less is worse
         return float(value)

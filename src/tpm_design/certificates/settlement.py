@@ -14,7 +14,7 @@ from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Problem
 from tpm_design.workspace.covers import Cover, Proof, prove
-from tpm_design.workspace.refutation import fails_at, singular_near
+from tpm_design.workspace.refutation import fails_at, folded_inside, singular_near
 from tpm_design.workspace.region_geometry import nearest_pose, place
 from tpm_design.workspace.regions import Points
 
@@ -147,9 +147,10 @@ def _refuted_at(demand: Demand, context: Context, mechanism: Mechanism, pose: Po
         singular = singular_near(mechanism, context.mode, part, here, context.placed, demand.bound)
         return None if singular is None else Breaking(singular, mechanism.parameters)
     statement = demand.statement(demand.bound, mechanism.kind)
-    return (
-        Breaking(here, mechanism.parameters) if fails_at(statement, mechanism, context.mode, here) else None
-    )
+    if fails_at(statement, mechanism, context.mode, here):
+        return Breaking(here, mechanism.parameters)
+    folded = folded_inside(mechanism, context.placed) if demand.kind == "reach" else None
+    return None if folded is None else Breaking(folded, mechanism.parameters)
 
 
 def _broken_in(

@@ -115,6 +115,12 @@ def _size(
     if silent and parameter.default is not None:
         if not same(value, parameter.default[limb]):
             yield f"machine.parameters.{parameter.name} is not what it is where the study does not give it"
+        return
+    tie = given.value(key)
+    if isinstance(tie, dict) and "equals" in tie:
+        source = given.fields(key).text("equals")
+        if design.number(source) != value:
+            yield f"the design's {key} is not its {source}"
     elif not _allowed(given, key, value, units, parameter.powers):
         yield f"the design's {key} is not within what the study gives"
 

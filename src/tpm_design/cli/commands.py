@@ -10,18 +10,27 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tpm_design.cli.comparison import comparison_text, worst_code, write_comparison
 from tpm_design.cli.guard import INTERRUPTED, NOT_PROVED, NOTHING_FEASIBLE
 from tpm_design.cli.progress import search_progress
 from tpm_design.cli.results import design_rows, evaluation_data, limit_text, result_text
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
 from tpm_design.mechanisms import mechanism_kind
-from tpm_design.problem import Design, evaluate
+from tpm_design.problem import Design, evaluate, with_ties
 from tpm_design.runs.folder import STUDY, newest_run, read_run
 from tpm_design.runs.optimize import check_plan
 from tpm_design.runs.search import best_entry
-from tpm_design.study import Study, choose_design, dump_yaml, load_study, study_schema, template
-from tpm_design.study.actions import optimize_study, plan_of, pose_values
+from tpm_design.study import (
+    Study,
+    choose_design,
+    dump_yaml,
+    load_comparison,
+    load_study,
+    study_schema,
+    template,
+)
+from tpm_design.study.actions import Run, optimize_study, plan_of, pose_values
 from tpm_design.units import unit_for
 
 RESULTS = Path("results")
@@ -45,6 +54,15 @@ def init_study(name: str, mechanism: str) -> int | None:
 
 
 def validate_study(path: Path, *, resolved: bool, quiet: bool) -> int | None:
+    comparison = load_comparison(path)
+    if comparison is not None:
+        for study in comparison.studies.values():
+            check_plan(study.problem, plan_of(study))
+        if resolved:
+            print("---\n".join(dump_yaml(study.resolved()) for study in comparison.studies.values()), end="")
+        elif not quiet:
+            print(f"{path} is valid: {', '.join(comparison.studies)}, asked the same.")
+        return None
     study = load_study(path)
     if study.problem.variables and len(study.problem.objectives) == 1:
         check_plan(study.problem, plan_of(study))
@@ -86,7 +104,8 @@ def chosen_design(path: Path, settings: Sequence[str]) -> tuple[Study, Design, t
     design, assumptions = choose_design(study, given)
     if stored is None:
         return study, design, assumptions
-    return study, {**stored, **{name: design[name] for name in given}}, ()
+    changed = {**stored, **{name: design[name] for name in given}}
+    return study, with_ties(study.problem.ties, changed), ()
 
 
 def evaluate_one(
@@ -206,36 +225,76 @@ def optimize_one(
         raise UsageError(
             f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
         )
-    from tpm_design.cli.certify import verdict_data, verdict_text
-
-    study = load_study(path).searched_with(seed=seed, budget=budget)
-    check_plan(study.problem, plan_of(study))
+    threads = workers or usable_processors()
+    comparison = load_comparison(path)
     # short compiled calls by several threads: the usual 5 ms would make them wait for one another
     sys.setswitchinterval(SWITCH_INTERVAL)
-    with search_progress(study.problem, study.units, study.optimizer.budget, quiet=quiet or as_json) as watch:
-        run = optimize_study(study, workers=workers or usable_processors(), output=output, watch=watch)
-    feasible = run.best is not None and run.best.status == "feasible"
+    if comparison is None:
+        study = load_study(path).searched_with(seed=seed, budget=budget)
+        run = _searched(study, threads, output, quiet=quiet or as_json)
+        print(json.dumps(_run_data(study, run), ensure_ascii=False) if as_json else _run_text(study, run))
+        return _ending(run)
+    studies = {
+        label: study.searched_with(seed=seed, budget=budget) for label, study in comparison.studies.items()
+    }
+    for study in studies.values():
+        check_plan(study.problem, plan_of(study))
+    runs = {}
+    for label, study in studies.items():
+        if not (quiet or as_json):
+            print(f"{label}: {study.problem.kind.title}", file=sys.stderr)
+        runs[label] = _searched(study, threads, output, quiet=quiet or as_json)
+        if runs[label].result.ending == "interrupted":
+            break
     if as_json:
-        data: dict[str, Any] = {"study": study.name, "run": str(run.folder), "status": run.status}
-        if run.best is not None:
-            data["best"] = evaluation_data(study.problem, study.units, run.best)
-        if run.verdict is not None:
-            data["verdict"] = verdict_data(study, run.verdict)
-        print(json.dumps(data, ensure_ascii=False))
+        data = {label: _run_data(studies[label], run) for label, run in runs.items()}
+        print(json.dumps({"comparison": comparison.name, "architectures": data}, ensure_ascii=False))
     else:
-        if run.best is not None and run.result.best is not None:
-            print(result_text(study.problem, study.units, run.best))
-            print("\n" + limit_text(study.problem, run.result.best))
-        if run.verdict is not None:
-            print("\n" + verdict_text(study, run.verdict) + "\n")
-        print(run.status)
-        for remark in run.result.remarks:
-            print(remark)
-        print(f"Run: {run.folder}\nNext: tpm-design report {run.folder}")
+        print(comparison_text(studies, runs))
+    table_file = write_comparison(output, comparison.name, studies, runs)
+    if not as_json:
+        print(f"Table: {table_file}")
+    return worst_code([_ending(run) for run in runs.values()])
+
+
+def _searched(study: Study, workers: int, output: Path, *, quiet: bool) -> Run:
+    check_plan(study.problem, plan_of(study))
+    with search_progress(study.problem, study.units, study.optimizer.budget, quiet=quiet) as watch:
+        return optimize_study(study, workers=workers, output=output, watch=watch)
+
+
+def _run_data(study: Study, run: Run) -> dict[str, Any]:
+    from tpm_design.cli.certify import verdict_data
+
+    data: dict[str, Any] = {"study": study.name, "run": str(run.folder), "status": run.status}
+    if run.best is not None:
+        data["best"] = evaluation_data(study.problem, study.units, run.best)
+    if run.verdict is not None:
+        data["verdict"] = verdict_data(study, run.verdict)
+    return data
+
+
+def _run_text(study: Study, run: Run) -> str:
+    from tpm_design.cli.certify import verdict_text
+
+    parts = []
+    if run.best is not None and run.result.best is not None:
+        parts += [
+            result_text(study.problem, study.units, run.best),
+            limit_text(study.problem, run.result.best),
+        ]
+    if run.verdict is not None:
+        parts.append(verdict_text(study, run.verdict))
+    lines = [run.status, *run.result.remarks, f"Run: {run.folder}", f"Next: tpm-design report {run.folder}"]
+    return "\n\n".join([*parts, "\n".join(lines)])
+
+
+def _ending(run: Run) -> int | None:
     if run.result.ending == "interrupted":
         return INTERRUPTED
     if run.verdict is not None and run.verdict.outcome != "proved":
         return NOT_PROVED
+    feasible = run.best is not None and run.best.status == "feasible"
     return None if feasible else NOTHING_FEASIBLE
 
 

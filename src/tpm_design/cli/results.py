@@ -19,12 +19,11 @@ NO_VALUE = "–"
 
 def design_rows(problem: Problem, units: Units, evaluation: Evaluation) -> list[list[str]]:
     """Quantity, value with unit, and the range it was searched in."""
-    ranges = {variable.name: variable for variable in problem.variables}
     rows = []
     for column in parameter_columns(problem, units):
         value = evaluation.design[column.name]
         text = value if isinstance(value, str) else units.written(value, column.unit)
-        rows.append([column.name, text, range_text(ranges.get(column.name), units)])
+        rows.append([column.name, text, range_text(problem, column.name, units)])
     return rows
 
 

@@ -1,16 +1,25 @@
-"""The mechanisms: one file each, registered here."""
+"""The mechanisms: one file each; a module here that declares ``KIND`` is one."""
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from types import MappingProxyType
 
 from tpm_design.errors import ParameterError, did_you_mean
-from tpm_design.mechanisms import uru
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.mechanisms.mechanism import Mechanism
 
-MECHANISMS: Mapping[str, MechanismKind] = MappingProxyType({kind.name: kind for kind in (uru.KIND,)})
+
+def _declared() -> dict[str, MechanismKind]:
+    """The kinds of all modules of this room, by name."""
+    modules = (import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__))
+    kinds = [module.KIND for module in modules if hasattr(module, "KIND")]
+    return {kind.name: kind for kind in sorted(kinds, key=lambda kind: kind.name)}
+
+
+MECHANISMS: Mapping[str, MechanismKind] = MappingProxyType(_declared())
 
 
 def mechanism_kind(name: str) -> MechanismKind:

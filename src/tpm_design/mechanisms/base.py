@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 Dimension = Literal["length", "angle", "ratio"]
 Domain = Literal["positive", "non-negative", "non-zero", "any"]
 
+Rotation = tuple[tuple[float, float, float], ...]
 ModeCandidates = Callable[[Mapping[str, tuple[float, float]], bool], tuple[dict[str, str], ...]]
 
 
@@ -19,7 +20,9 @@ ModeCandidates = Callable[[Mapping[str, tuple[float, float]], bool], tuple[dict[
 class Parameter:
     """One design parameter.
 
-    ``per_limb``: the name sets all limbs, ``name1``, ``name2``, ``name3`` one limb each.
+    ``per_limb``: the name sets all limbs, ``name1``, ``name2``, ``name3`` one limb each. ``default``: SI
+    values per limb where none is given; None: it must be given. ``moving_link``: the length of a link that
+    moves, so that it counts in the total link length.
     """
 
     name: str
@@ -28,6 +31,8 @@ class Parameter:
     domain: Domain
     description: str
     per_limb: bool = True
+    default: tuple[float, ...] | None = None
+    moving_link: bool = False
 
 
 @dataclass(frozen=True)
@@ -44,12 +49,12 @@ class ModeField:
 class Limit:
     """One optional joint limit or link dimension under ``limits:`` of a study.
 
-    ``kind`` "range" takes ``{min, max}``, "number" one non-negative number.
+    ``kind`` "range" takes ``{min, max}``, "number" one non-negative number, "switch" true or false.
     """
 
     name: str
     dimension: Dimension
-    kind: Literal["range", "number"]
+    kind: Literal["range", "number", "switch"]
     description: str
 
 
@@ -69,6 +74,10 @@ class MechanismKind:
     ``build(parameters, limits)``: SI values by name → a mechanism. ``farthest_reach(ranges)``: a bound
     (m) on the distance of any reachable pose from the origin, from the (lowest, highest) SI value of
     every parameter name that is set. ``example``: SI values of a machine that works, for new studies.
+    ``pose_units``: SI units of the pose's coordinates. ``transmission_drive``: the drive for which each limb
+    pushes along its row of A, so that transmission indices exist; None where there is none.
+    ``limb_rotation``: rows of the rotation that carries limb i to limb i + 1 where the limbs' lengths go with
+    it; None where the limbs are not placed alike.
     ``mode_candidates(ranges, isotropic)``: sign strings of one working mode of each set that symmetry
     makes equal for every design of the ranges; None: all modes count as different.
     """
@@ -88,7 +97,15 @@ class MechanismKind:
     build: Callable[[Mapping[str, Any], Mapping[str, Any]], Mechanism]
     farthest_reach: Callable[[Mapping[str, tuple[float, float]]], float]
     limb_count: int = 3
+    pose_units: tuple[str, ...] = ("m", "m", "m")
+    transmission_drive: str | None = "motor"
+    limb_rotation: Rotation | None = None
     mode_candidates: ModeCandidates | None = None
+
+    @property
+    def translational(self) -> bool:
+        """Whether poses are positions, all coordinates lengths."""
+        return set(self.pose_units) == {"m"}
 
     def parameter(self, name: str) -> Parameter | None:
         """The parameter that ``name`` sets (``f`` or ``f2``), or None."""

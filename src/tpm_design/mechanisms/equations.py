@@ -2,7 +2,8 @@
 
 Each is called inside compiled code with the mechanism's geometry and mode (named tuples of numbers)
 and a pose x, y, z, all of one kind of number: float, Interval or Dual. A mechanism's file implements
-them with ``@formula(name, Geometry)``.
+them with ``@formula(name, Geometry)``. Those in ``derived.py`` follow from the others where a mechanism
+gives none of its own.
 """
 
 from __future__ import annotations
@@ -51,11 +52,6 @@ def closure(geometry: Any, motor: Any, q: Any, chart: Any, u: Any, v: Any, w: An
     whichever working mode, and a tuple of numbers that are > 0 only where the pose is none such. Both may
     allow too much. The pose is given by coordinates u, v, w in a ``chart`` of the mechanism's own, a tuple
     of floats; u, v, w alone may be other than floats. ``motor`` as in ``velocity_map``."""
-    raise NotImplementedError
-
-
-def joint_angles(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
-    """Per limb, a tuple of its joint angles (rad)."""
     raise NotImplementedError
 
 

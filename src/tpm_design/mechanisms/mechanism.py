@@ -5,16 +5,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tpm_design.arithmetic import Interval
 from tpm_design.errors import ParameterError, did_you_mean
-from tpm_design.mechanisms import pointwise
+from tpm_design.mechanisms import derived, pointwise  # noqa: F401  (derived equations are registered)
 from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import MechanismKind
+from tpm_design.mechanisms.fold_lines import FoldLine
+from tpm_design.mechanisms.parameters import enclosed_values, mode_signs
 
 FloatArray = NDArray[np.float64]
 
@@ -29,15 +31,21 @@ class Mode:
 
 @dataclass(frozen=True)
 class Mechanism(ABC):
-    """One machine. ``parameters``: name → SI value per limb; ``geometry``: the same for the kernels."""
+    """One machine. ``parameters``: name → SI value per limb; ``geometry``: the same for the kernels.
+    ``signs_class``: named tuple of the signs of a mode, its fields named as those of the mode."""
+
+    signs_class: ClassVar[type[Any]]
 
     kind: MechanismKind
     parameters: Mapping[str, tuple[float, ...]]
     geometry: Any
 
-    @abstractmethod
     def mode_of(self, signs: Mapping[str, str]) -> Mode:
-        """The working mode named by sign strings, e.g. ``{"octant": "+++", "elbows": "+-+"}``."""
+        """The working mode named by sign strings, e.g. ``{"octant": "+++", "elbows": "+-+"}``. Raises
+        ParameterError on anything but one sign string for each field."""
+        values = mode_signs(self.kind, signs)
+        label = " ".join(signs[field.name] for field in self.kind.mode_fields)
+        return Mode(label, self.signs_class(**values))
 
     def single_octants(self, mode: Mode) -> tuple[Mode, ...]:
         """Modes that make up ``mode`` between planes that no aspect crosses; itself where there are none."""
@@ -47,18 +55,29 @@ class Mechanism(ABC):
     def reach_radius(self) -> float:
         """Every reachable pose lies within this distance (m) of the origin."""
 
+    def fold_lines(self) -> tuple[FoldLine, ...]:
+        """Lines of folded limbs that no region may hold in its interior; none where reach bounds all of them
+        already."""
+        return ()
+
     @abstractmethod
     def enclosed_geometry(self, tolerance: Mapping[str, float]) -> Any:
         """The geometry as Intervals that hold every machine whose parameters differ from this one's by no
         more than ``tolerance`` (name → ±, SI), each limb by itself; ``{}``: this machine alone."""
 
-    @abstractmethod
     def total_link_length(self) -> float:
         """Sum over the limbs of the moving links (m)."""
+        return sum(sum(self.parameters[p.name]) for p in self.kind.parameters if p.moving_link)
 
-    @abstractmethod
     def enclosed_link_length(self, tolerance: Mapping[str, float]) -> Interval:
         """Bounds (m) of ``total_link_length`` for every machine within ``tolerance``."""
+        values = enclosed_values(self.kind, self.parameters, tolerance)
+        total = Interval(0.0, 0.0)
+        for parameter in self.kind.parameters:
+            if parameter.moving_link:
+                for length in values[parameter.name]:
+                    total = total + length
+        return total
 
     @abstractmethod
     def assemblies(

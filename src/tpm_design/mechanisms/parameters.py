@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tpm_design.arithmetic import Interval
 from tpm_design.errors import ParameterError, did_you_mean
 from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter
 
@@ -45,6 +47,8 @@ def _values(
             raise ParameterError(
                 f"{kind.name}: {parameter.name!r} has {len(values)} values for {count} limbs."
             )
+    elif not named and parameter.default is not None:
+        values = parameter.default
     else:
         missing = [name for name in (single or [parameter.name]) if name not in given]
         if missing:
@@ -68,6 +72,11 @@ def limb_tolerances(kind: MechanismKind, tolerance: Mapping[str, float]) -> dict
             )
         if not 0.0 <= bound < math.inf:
             raise ParameterError(f"The tolerance {name} = {bound!r} is not a non-negative number.")
+        if parameter.dimension == "angle" and bound > 0.0:
+            raise ParameterError(
+                f"{name} is an angle, and angles have no tolerance: misplaced axes destroy pure translation.",
+                remedy="Give tolerances of lengths and ratios.",
+            )
         count = kind.limb_count if parameter.per_limb else 1
         values = list(found.get(parameter.name, (0.0,) * count))
         for limb in range(count):
@@ -75,6 +84,20 @@ def limb_tolerances(kind: MechanismKind, tolerance: Mapping[str, float]) -> dict
                 values[limb] = float(bound)
         found[parameter.name] = tuple(values)
     return found
+
+
+def enclosed_values(
+    kind: MechanismKind, parameters: Mapping[str, tuple[float, ...]], tolerance: Mapping[str, float]
+) -> dict[str, tuple[Interval, ...]]:
+    """Each parameter per limb as an Interval that holds its value ± its tolerance (SI)."""
+    bounds = limb_tolerances(kind, tolerance)
+    return {
+        name: tuple(
+            Interval(value, value) if bound == 0.0 else value + Interval(-bound, bound)
+            for value, bound in zip(values, bounds.get(name, (0.0,) * len(values)), strict=True)
+        )
+        for name, values in parameters.items()
+    }
 
 
 def checked_value(kind: MechanismKind, parameter: Parameter, value: object) -> float:
@@ -128,3 +151,22 @@ def three_numbers(values: ArrayLike, name: str, remedy: str) -> NDArray[np.float
     if not np.isfinite(array).all():
         raise ParameterError(f"{name} is not finite.", remedy=remedy)
     return array
+
+
+def span(ranges: Mapping[str, tuple[float, float]], name: str) -> tuple[float, float]:
+    """Lowest and highest SI value of a parameter over all limbs, from the ranges of the names set."""
+    found = [ranges[key] for key in (name, f"{name}1", f"{name}2", f"{name}3") if key in ranges]
+    return min(low for low, _ in found), max(high for _, high in found)
+
+
+def swing_limit(limits: Mapping[str, Any]) -> float | None:
+    """The limit ``swing`` (rad), None where it limits nothing. Raises ParameterError beyond a right angle."""
+    if "swing" not in limits:
+        return None
+    swing = float(limits["swing"])
+    if not 0.0 < swing <= 0.5 * math.pi:
+        raise ParameterError(
+            f"The limit swing = {math.degrees(swing):g}° is not between 0 and 90°.",
+            remedy="Leave it out where nothing limits the swing.",
+        )
+    return swing

@@ -54,11 +54,10 @@ def _square(w, u, v, s, t):  # type: ignore[no-untyped-def]
 
 
 @inner
-def chain_distance(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
-    """Distance (m) between the two-link chains a0–a1–a2 and b0–b1–b2."""
-    return min(
-        segment_distance(a0, a1, b0, b1),
-        segment_distance(a0, a1, b1, b2),
-        segment_distance(a1, a2, b0, b1),
-        segment_distance(a1, a2, b1, b2),
-    )
+def chain_distance(chain, other):  # type: ignore[no-untyped-def]
+    """Distance (m) between two chains of straight links, each a tuple of joint centres."""
+    least = math.inf
+    for i in range(len(chain) - 1):
+        for j in range(len(other) - 1):
+            least = min(least, segment_distance(chain[i], chain[i + 1], other[j], other[j + 1]))
+    return least

@@ -27,7 +27,7 @@ def distal_link(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: 
     """(a, c, γ) of links f and r for a point with ρ² = α² + β²; elbow + has γ < 0.
 
     Out of reach the elbow stays straight. In compiled code, for floats, Intervals, Duals of either, and
-    Affine points.
+    Affine points with ``r`` Affine or constant.
     """
     raise NotImplementedError
 
@@ -135,7 +135,16 @@ def _duals_of_the_lengths(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: An
 
 
 def _forms_of_the_point(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
-    both, product, difference, inverse_r = bounds_from_lengths(as_interval(f), as_interval(r))
+    return _forms(alpha, beta, rho_squared, bounds_from_lengths(as_interval(f), as_interval(r)), elbow)
+
+
+def _forms_of_all(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: Any) -> Any:
+    return _forms(alpha, beta, rho_squared, bounds_from_lengths(as_interval(f), r), elbow)
+
+
+@register_jitable(**STRICT)
+def _forms(alpha: Any, beta: Any, rho_squared: Any, lengths: Any, elbow: Any) -> Any:
+    both, product, difference, inverse_r = lengths
     bent = (0.5 * elbow) * root(product - sqr(rho_squared - both))
     inverse = 1.0 / rho_squared
     share, turn = 0.5 + difference * inverse, bent * inverse
@@ -154,7 +163,7 @@ def _for_others(alpha: Any, beta: Any, rho_squared: Any, f: Any, r: Any, elbow: 
     if is_dual(rho_squared):
         return _duals_of_the_point
     if is_affine(rho_squared):
-        return _forms_of_the_point
+        return _forms_of_all if is_affine(r) else _forms_of_the_point
     return None if all(map(is_number, (alpha, beta, rho_squared, f, r))) else _intervals
 
 

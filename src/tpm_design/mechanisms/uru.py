@@ -35,11 +35,12 @@ from tpm_design.arithmetic.algebra import determinant
 from tpm_design.arithmetic.compilation import STRICT
 from tpm_design.arithmetic.lifting import constant, replaced
 from tpm_design.mechanisms import equations, forward
+from tpm_design.mechanisms.angles import NEXT_AXIS
 from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
+from tpm_design.mechanisms.joint_limits import enclosed_range, joint_range, range_numbers
 from tpm_design.mechanisms.mechanism import FloatArray, Mechanism, Mode
-from tpm_design.mechanisms.parameters import limb_tolerances, limb_values, mode_signs, three_numbers
-from tpm_design.mechanisms.segments import chain_distance
+from tpm_design.mechanisms.parameters import enclosed_values, limb_values, span, three_numbers
 from tpm_design.mechanisms.symmetry import IDENTITY, SignedPermutation, mode_orbits, symmetries
 from tpm_design.mechanisms.two_link import distal_link
 
@@ -291,7 +292,12 @@ def _limb_angles(geometry, limb, elbow, p, pj, pk):  # type: ignore[no-untyped-d
     return second, third, -(second + third)
 
 
-@formula(equations.joint_angles, UruGeometry)
+def joint_angles(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """Joint angles of all limbs (rad), see the implementation."""
+    raise NotImplementedError
+
+
+@formula(joint_angles, UruGeometry)
 def _joint_angles(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """θ_i1 … θ_i5 of each limb; θ_i5 = −θ_i1 keeps the platform parallel."""
     k1, k2, k3 = mode.elbows
@@ -311,7 +317,7 @@ def _joint_angles(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
 @formula(equations.actuators, UruGeometry)
 def _actuators(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
     """Joints: θ_i2. Motors: θ_iM = θ_i2/k_i + θ_i1 (11), the encoder's zero taken as 0."""
-    limb1, limb2, limb3 = equations.joint_angles(geometry, mode, x, y, z)
+    limb1, limb2, limb3 = joint_angles(geometry, mode, x, y, z)
     if motor == 0.0:
         return limb1[1], limb2[1], limb3[1]
     k1, k2, k3 = geometry.gear
@@ -442,22 +448,6 @@ def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def
     )
 
 
-@formula(equations.input_transmission, UruGeometry)
-def _input_transmission(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """Driven at the joints, the elbow moves across the proximal link: |v_i · t_i| = |sin θ_i3|."""
-    return equations.serial_margins(geometry, mode, x, y, z)
-
-
-@formula(equations.limb_clearance, UruGeometry)
-def _limb_clearance(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """Links A_iC_i and C_iB_i as capsules of the link radius, limbs taken in pairs."""
-    (a1, c1, b1), (a2, c2, b2), (a3, c3, b3) = equations.joint_centres(geometry, mode, x, y, z)
-    first = chain_distance(a1, c1, b1, a2, c2, b2)
-    second = chain_distance(a2, c2, b2, a3, c3, b3)
-    third = chain_distance(a3, c3, b3, a1, c1, b1)
-    return min(first, second, third) - 2.0 * geometry.link_radius
-
-
 ELBOWS: tuple[Triple, ...] = tuple(itertools.product((1.0, -1.0), (1.0, -1.0), (1.0, -1.0)))
 
 # charts overlap, so that an assembly with two equal coordinates lies inside one
@@ -496,22 +486,11 @@ def shaft_possible(angle: float, gear: float) -> bool:
     return min(ends) - math.pi <= angle <= max(ends) + math.pi
 
 
-FULL_TURN = (-math.pi, math.pi)
-# a bound on a cosine that every angle is above
-NO_LIMIT = -2.0
-
-
-def limit_enclosure(low: float, high: float) -> tuple[Interval, Interval, Interval]:
-    """Cosine and sine of the middle of a joint's range and cosine of its half width, each enclosed."""
-    middle = 0.5 * (Interval(low, low) + high)
-    half = 0.5 * (Interval(high, high) - low)
-    half = Interval(min(math.pi, half.lo), min(math.pi, half.hi))
-    return cosine(middle), sine(middle), cosine(half)
-
-
 @dataclass(frozen=True)
 class Uru(Mechanism):
     """A LaMaViP 3-URU with dimensions. Pose: (x, y, z) of the platform's point P."""
+
+    signs_class = UruSigns
 
     geometry: UruGeometry
     joint_ranges: tuple[tuple[float, float] | None, ...]
@@ -520,11 +499,6 @@ class Uru(Mechanism):
         """The working mode on the given sides of the coordinate planes (``"any"``: all octants) with the
         given elbows; elbow + has sin θ_i3 < 0. Raises ParameterError on anything but three signs."""
         return self.mode_of({"octant": octant, "elbows": elbows})
-
-    def mode_of(self, signs: Mapping[str, str]) -> Mode:
-        values = mode_signs(self.kind, signs)
-        label = " ".join(signs[field.name] for field in self.kind.mode_fields)
-        return Mode(label, UruSigns(octant=values["octant"], elbows=values["elbows"]))
 
     def single_octants(self, mode: Mode) -> tuple[Mode, ...]:
         """det H = 0 (17) on the coordinate planes."""
@@ -540,41 +514,19 @@ class Uru(Mechanism):
         )
 
     def enclosed_geometry(self, tolerance: Mapping[str, float]) -> Any:
-        bounds = limb_tolerances(self.kind, tolerance)
-
-        def held(name: str) -> Any:
-            around = bounds.get(name, (0.0, 0.0, 0.0))
-            return tuple(
-                Interval(value, value) if bound == 0.0 else value + Interval(-bound, bound)
-                for value, bound in zip(self.parameters[name], around, strict=True)
-            )
-
-        ranges = [limit_enclosure(*(FULL_TURN if r is None else r)) for r in self.joint_ranges]
-        limit_bounds = [
-            Interval(NO_LIMIT, NO_LIMIT) if joint is None else bound
-            for joint, (_, _, bound) in zip(self.joint_ranges, ranges, strict=True)
-        ]
+        held = enclosed_values(self.kind, self.parameters, tolerance)
+        middles, across, bounds = zip(*map(enclosed_range, self.joint_ranges), strict=True)
         intervals: dict[str, Any] = {
-            "base": held("db"),
-            "platform": held("dp"),
-            "proximal": held("f"),
-            "distal": held("r"),
-            "gear": held("k"),
-            "limit_cosine": tuple(middle for middle, _, _ in ranges),
-            "limit_sine": tuple(middle for _, middle, _ in ranges),
-            "limit_bound": tuple(limit_bounds),
+            "base": held["db"],
+            "platform": held["dp"],
+            "proximal": held["f"],
+            "distal": held["r"],
+            "gear": held["k"],
+            "limit_cosine": middles,
+            "limit_sine": across,
+            "limit_bound": bounds,
         }
         return self.geometry._replace(**intervals)
-
-    def total_link_length(self) -> float:
-        return sum(self.geometry.proximal) + sum(self.geometry.distal)
-
-    def enclosed_link_length(self, tolerance: Mapping[str, float]) -> Interval:
-        g = self.enclosed_geometry(tolerance)
-        total = Interval(0.0, 0.0)
-        for length in (*g.proximal, *g.distal):
-            total = total + length
-        return total
 
     def assemblies(
         self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor"
@@ -610,23 +562,18 @@ class Uru(Mechanism):
 def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str, Any]) -> Uru:
     """A 3-URU from SI values: db, dp, f, r (m), k, each one number or three; limits as declared."""
     values = limb_values(KIND, parameters)
-    ranges = [limits.get(f"theta{joint}") for joint in (1, 2, 3, 4)]
-    joint_ranges = tuple(None if r is None else (float(r[0]), float(r[1])) for r in ranges)
-    spans = [FULL_TURN if r is None else r for r in joint_ranges]
-    middles = [0.5 * (low + high) for low, high in spans]
-    halves = [min(math.pi, 0.5 * (high - low)) for low, high in spans]
+    joint_ranges = tuple(joint_range(limits, f"theta{joint}") for joint in (1, 2, 3, 4))
+    middles, across, bounds = zip(*map(range_numbers, joint_ranges), strict=True)
     geometry = UruGeometry(
         base=values["db"],
         platform=values["dp"],
         proximal=values["f"],
         distal=values["r"],
         gear=values["k"],
-        limited=0.0 if all(r is None for r in ranges) else 1.0,
-        limit_cosine=tuple(math.cos(m) for m in middles),
-        limit_sine=tuple(math.sin(m) for m in middles),
-        limit_bound=tuple(
-            NO_LIMIT if r is None else math.cos(h) for r, h in zip(joint_ranges, halves, strict=True)
-        ),
+        limited=0.0 if all(joint is None for joint in joint_ranges) else 1.0,
+        limit_cosine=middles,
+        limit_sine=across,
+        limit_bound=bounds,
         link_radius=float(limits.get("link_radius", 0.0)),
     )
     return Uru(kind=KIND, parameters=values, geometry=geometry, joint_ranges=joint_ranges)
@@ -634,14 +581,9 @@ def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str
 
 def farthest_reach(ranges: Mapping[str, tuple[float, float]]) -> float:
     """Largest f + r + |d_p − d_b| that the ranges allow (m)."""
-
-    def span(name: str) -> tuple[float, float]:
-        found = [ranges[key] for key in (name, f"{name}1", f"{name}2", f"{name}3") if key in ranges]
-        return min(low for low, _ in found), max(high for _, high in found)
-
-    base, platform = span("db"), span("dp")
+    base, platform = span(ranges, "db"), span(ranges, "dp")
     offset = max(abs(platform[1] - base[0]), abs(platform[0] - base[1]))
-    return span("f")[1] + span("r")[1] + offset
+    return span(ranges, "f")[1] + span(ranges, "r")[1] + offset
 
 
 def mode_candidates(ranges: Mapping[str, tuple[float, float]], isotropic: bool) -> tuple[dict[str, str], ...]:
@@ -677,8 +619,8 @@ KIND = MechanismKind(
         Parameter(
             "dp", "d_p", "length", "non-negative", "distance of the platform joints B_i from its point P"
         ),
-        Parameter("f", "f_i", "length", "positive", "proximal link A_iC_i"),
-        Parameter("r", "r_i", "length", "positive", "distal link C_iB_i"),
+        Parameter("f", "f_i", "length", "positive", "proximal link A_iC_i", moving_link=True),
+        Parameter("r", "r_i", "length", "positive", "distal link C_iB_i", moving_link=True),
         Parameter("k", "k_i", "ratio", "non-zero", "gear ratio of the bevel gearbox, either sign"),
     ),
     pose=("x", "y", "z"),
@@ -696,6 +638,8 @@ KIND = MechanismKind(
         Limit("link_radius", "length", "number", "radius of every link, for clearance"),
     ),
     determinants=("translation", "actuation", "rotation"),
+    transmission_drive="joint",
+    limb_rotation=NEXT_AXIS,
     singularities=(
         Singularity("serial", "a limb stretched or folded, sin θ_i3 = 0", "(27)"),
         Singularity("translation", "det V = 0: uncontrolled if driven at the joints", "(20), (25)"),

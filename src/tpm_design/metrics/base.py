@@ -56,10 +56,16 @@ class Measurement:
         return cls(float("nan"), notes={UNDEFINED: reason})
 
 
+def of_positions(kind: MechanismKind) -> bool:
+    """Whether a metric in metres or cubic metres of pose space means anything: poses are positions."""
+    return kind.translational
+
+
 @dataclass(frozen=True)
 class Metric:
     """One figure of merit. ``scale`` (in the metric's SI unit) makes its violation dimensionless. ``notes``:
-    names of the notes its measurements may carry."""
+    names of the notes its measurements may carry. ``applies``: whether it means anything for a mechanism;
+    ``drives``: those of the mechanism's drives for which it does, the usual one first."""
 
     name: str
     unit: str
@@ -73,6 +79,7 @@ class Metric:
     differentiable: bool = True
     notes: tuple[str, ...] = ()
     applies: Callable[[MechanismKind], bool] = lambda kind: True
+    drives: Callable[[MechanismKind], tuple[str, ...]] = lambda kind: kind.drives
 
     def option(self, name: str) -> Option | None:
         return next((option for option in self.options if option.name == name), None)

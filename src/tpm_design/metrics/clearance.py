@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from tpm_design.metrics.base import Measurement, Metric
+from tpm_design.metrics.base import Measurement, Metric, of_positions
 from tpm_design.metrics.context import Context
 from tpm_design.workspace.indices import CLEARANCE, LEGS, SERIAL, Index
 
@@ -54,7 +54,7 @@ def _distance(name: str, condition: str) -> Metric:
     return Metric(
         f"{name}_singularity_distance", "m", "maximize", 0.1,
         f"least Euclidean distance from the region to {condition}; minus the depth where it cuts in",
-        SEARCH, _locus_distance(name), differentiable=False, notes=("locus",),
+        SEARCH, _locus_distance(name), differentiable=False, notes=("locus",), applies=of_positions,
     )  # fmt: skip
 
 
@@ -65,6 +65,7 @@ METRICS = (
     Metric(
         "boundary_distance", "m", "maximize", 0.1,
         "least Euclidean distance from the region to the reach boundary", SEARCH, _boundary_distance,
+        applies=of_positions,
     ),
     Metric(
         "singularity_margin_min", "-", "maximize", 1.0,

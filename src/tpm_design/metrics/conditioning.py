@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tpm_design.metrics.base import Measurement, Metric, Option
+from tpm_design.metrics.base import Measurement, Metric, Option, of_positions
 from tpm_design.metrics.context import Context
 from tpm_design.workspace.averages import GAUSS_NODES, Averages, conditioning_averages
 from tpm_design.workspace.indices import CONDITION_2, CONDITION_FROBENIUS, Index, index_values
@@ -101,14 +101,14 @@ def _share_of(
 METRICS = (
     Metric(
         "conditioning_min", "-", "maximize", 1.0, "least 1/κ over the domain", SOURCE, _minimum,
-        (NORM, DRIVE, OVER),
+        (NORM, DRIVE, OVER), applies=of_positions,
     ),
     Metric(
         "conditioning_mean", "-", "maximize", 1.0, "volume mean of 1/κ (GCI)", SOURCE, _mean,
-        (NORM, DRIVE, OVER),
+        (NORM, DRIVE, OVER), applies=of_positions,
     ),
     Metric(
         "conditioning_share", "-", "maximize", 1.0, "share of the domain with 1/κ ≥ threshold", SOURCE,
-        _share, (NORM, DRIVE, OVER, THRESHOLD),
+        _share, (NORM, DRIVE, OVER, THRESHOLD), applies=of_positions,
     ),
 )  # fmt: skip

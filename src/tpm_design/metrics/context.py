@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.aspects import RayField, locate, mode_field, region_field
 from tpm_design.workspace.extremes import Extreme, least_over_region
+from tpm_design.workspace.fold_clearance import fold_clearance
 from tpm_design.workspace.indices import DETERMINANT, EXTENT, REACH, Index
 from tpm_design.workspace.loci import LocusDistance, locus_distance
 from tpm_design.workspace.region_geometry import PlacedRegion
@@ -77,8 +78,15 @@ class Context:
 
     @cached_property
     def reach(self) -> Extreme:
-        """Least workspace margin (m) over the region: negative by the worst shortfall."""
-        return self.least(Index(REACH))
+        """Least workspace margin (m) over the region: negative by the worst shortfall, or by the depth to
+        which a line on which a limb is folded enters the region."""
+        found = self.least(Index(REACH))
+        folds = [fold_clearance(self.placed, line) for line in self.mechanism.fold_lines()]
+        pieces = (*found.pieces, *(fold.value for fold in folds))
+        nearest = min(folds, key=lambda fold: fold.value, default=None)
+        if nearest is None or nearest.value >= found.value:
+            return replace(found, pieces=pieces)
+        return Extreme(nearest.value, found.error, nearest.pose, pieces)
 
     @property
     def reachable(self) -> bool:

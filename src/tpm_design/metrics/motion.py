@@ -5,14 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from tpm_design.metrics.base import Measurement, Metric, Option
+from tpm_design.mechanisms.base import MechanismKind
+from tpm_design.metrics.base import Measurement, Metric, Option, of_positions
 from tpm_design.metrics.context import Context
 from tpm_design.workspace.indices import FASTEST, SENSITIVITY, SLOWEST, TRANSMISSION, Index
 
 DRIVE = Option("drive", "choice", "actuators: motors or joints", default="motor", choices=("motor", "joint"))
-JOINT_DRIVE = Option(
-    "drive", "choice", "the index is not defined for motors", default="joint", choices=("joint",)
-)
+
+
+def _pushing(kind: MechanismKind) -> tuple[str, ...]:
+    """The drive for which each limb pushes along its row."""
+    return () if kind.transmission_drive is None else (kind.transmission_drive,)
+
+
+def _transmission(context: Context, options: Mapping[str, Any]) -> Measurement:
+    if not context.reachable:
+        return Measurement.undefined("the region is not reachable")
+    found = context.least(Index(TRANSMISSION))
+    return Measurement(found.value, found.error, pieces=found.pieces)
 
 
 def _extreme(quantity: int, sign: float) -> Callable[[Context, Mapping[str, Any]], Measurement]:
@@ -31,21 +41,22 @@ def _extreme(quantity: int, sign: float) -> Callable[[Context, Mapping[str, Any]
 METRICS = (
     Metric(
         "velocity_min", "m/rad or -", "maximize", 1.0, "least singular value of J over the region",
-        "singular values of ẋ = J q̇", _extreme(SLOWEST, 1.0), (DRIVE,),
+        "singular values of ẋ = J q̇", _extreme(SLOWEST, 1.0), (DRIVE,), applies=of_positions,
     ),
     Metric(
         "velocity_max", "m/rad or -", "minimize", 1.0, "greatest singular value of J over the region",
-        "singular values of ẋ = J q̇", _extreme(FASTEST, -1.0), (DRIVE,),
+        "singular values of ẋ = J q̇", _extreme(FASTEST, -1.0), (DRIVE,), applies=of_positions,
     ),
     Metric(
         "transmission_min", "-", "maximize", 1.0,
         "least input or output transmission index over the region",
         "J. Wang, C. Wu, X.-J. Liu, Performance evaluation of parallel manipulators, 2010",
-        _extreme(TRANSMISSION, 1.0), (JOINT_DRIVE,),
+        _transmission, (DRIVE,), applies=lambda kind: kind.transmission_drive is not None, drives=_pushing,
     ),
     Metric(
         "position_sensitivity", "-", "minimize", 1.0,
         "largest ‖∂x/∂(length errors)‖ over the region, actuators locked",
         "loop closure differentiated in every length", _extreme(SENSITIVITY, -1.0), (DRIVE,),
+        applies=of_positions,
     ),
 )  # fmt: skip

@@ -124,7 +124,6 @@ def _design(reported: Reported) -> list[str]:
     if reported.best is None:
         return []
     problem, units = reported.problem, reported.study.units
-    variables = {variable.name: variable for variable in problem.variables}
     rows = []
     for column in parameter_columns(problem, units):
         value = reported.best.evaluation.design[column.name]
@@ -136,7 +135,7 @@ def _design(reported: Reported) -> list[str]:
                 code_cell(column.name),
                 shown,
                 NONE if column.unit in {"", "-"} else units.name(column.unit),
-                text(range_text(variables.get(column.name), units)),
+                text(range_text(problem, column.name, units)),
                 text(meaning),
             ]
         )

@@ -16,6 +16,10 @@ from tpm_design.workspace.indices import CONDITION_2, CONDITION_FROBENIUS, LEGS,
 CONDITIONING = ("conditioning_min", "conditioning_share", "conditioning_mean")
 
 
+# metres: a plane of the octant is a singularity as well
+CLOSE = 1e-9
+
+
 @dataclass(frozen=True)
 class ConditioningShown:
     """Which 1/κ is drawn, and the study's bound on it."""
@@ -166,4 +170,8 @@ def _nearest(context: Context) -> Nearest | None:
         distance = context.locus_distance(part)
         if distance.pose is not None:
             found.append(Nearest(f"{name} singularity", distance.value, distance.pose))
-    return min(found, key=lambda limit: limit.distance)
+    nearest = min(found, key=lambda limit: limit.distance)
+    # what is left are the limits of joints, measured on the links that they turn
+    if context.reach.value < nearest.distance - CLOSE:
+        return Nearest("joint limit", context.reach.value, context.reach.pose)
+    return nearest

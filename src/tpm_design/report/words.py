@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tpm_design.problem import Goal, Problem, Variable
+from tpm_design.problem import Goal, Problem
 from tpm_design.units import Units, si_unit
 from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere
 
@@ -71,8 +71,11 @@ def centre_text(problem: Problem, units: Units) -> str:
     return "its centre free" if len(free) == 3 else f"its centre free along {axes}"
 
 
-def range_text(variable: Variable | None, units: Units) -> str:
+def range_text(problem: Problem, name: str, units: Units) -> str:
     """Where a quantity was searched."""
+    if name in problem.ties:
+        return f"equals {problem.ties[name]}"
+    variable = next((variable for variable in problem.variables if variable.name == name), None)
     if variable is None:
         return "fixed"
     unit = si_unit(variable.dimension)

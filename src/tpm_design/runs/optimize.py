@@ -116,7 +116,7 @@ def search(
 def view_of(log: EvaluationLog, limit: int) -> UnitSearch:
     """The whole design space, up to ``limit`` entries in the log."""
     problem = log.problem
-    space = DesignSpace(problem.variables, problem.fixed, octant_signs(problem.modes))
+    space = DesignSpace(problem.variables, problem.fixed, octant_signs(problem.modes), problem.ties)
     return UnitSearch(log, space, space.start(), limit, (1,) * len(problem.constraints))
 
 

@@ -28,7 +28,7 @@ def parameter_columns(problem: Problem, units: Units) -> list[Column]:
     order = [*problem.kind.parameter_names(), "center_x", "center_y", "center_z", "mode"]
     columns = []
     for name in order:
-        if name in free or name in problem.fixed:
+        if name in free or name in problem.fixed or name in problem.ties:
             unit = "" if name == "mode" else free.get(name) or _fixed_unit(problem, name)
             columns.append(Column(name, unit, name if not unit else units.heading(name, unit)))
     return columns

@@ -1,5 +1,6 @@
 """Study files: strict YAML in, a validated problem out; the only place that knows YAML."""
 
+from tpm_design.study.comparison import Comparison, load_comparison
 from tpm_design.study.design import choose_design
 from tpm_design.study.plain import dump_yaml
 from tpm_design.study.resolve import load_study
@@ -9,6 +10,7 @@ from tpm_design.study.sweep import GridSweep, ListSweep, SampleSweep, Sweep
 from tpm_design.study.template import template
 
 __all__ = [
+    "Comparison",
     "GridSweep",
     "ListSweep",
     "OptimizerSettings",
@@ -17,6 +19,7 @@ __all__ = [
     "Sweep",
     "choose_design",
     "dump_yaml",
+    "load_comparison",
     "load_study",
     "study_schema",
     "template",

@@ -13,13 +13,13 @@ from tpm_design.certificates.document import FILE as CERTIFICATE
 from tpm_design.certificates.document import document, write_document
 from tpm_design.certificates.verdict import Verdict
 from tpm_design.errors import UsageError, did_you_mean
-from tpm_design.problem import Design, Evaluation, evaluate
+from tpm_design.problem import Design, Evaluation, evaluate, with_ties
 from tpm_design.runs.folder import RunWriter, create_run_folder, provenance, text_hash
 from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, search
 from tpm_design.runs.rounds import Proving, search_certified
 from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import EvaluationTable, csv_line
-from tpm_design.study.design import choose_design
+from tpm_design.study.design import choose_design, tied_error
 from tpm_design.study.plain import dump_yaml
 
 if TYPE_CHECKING:
@@ -51,7 +51,9 @@ def evaluate_design(study: Study, values: Mapping[str, float | str]) -> Evaluati
     for name in values:
         if name not in design:
             raise UsageError(f"This study has no quantity {name!r}.", remedy=did_you_mean(name, design))
-    return evaluate(study.problem, {**design, **values})
+        if name in study.problem.ties:
+            raise tied_error(study.problem.ties, name)
+    return evaluate(study.problem, with_ties(study.problem.ties, {**design, **values}))
 
 
 def plan_of(study: Study) -> SearchPlan:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from tpm_design.errors import UsageError, did_you_mean
-from tpm_design.problem import Design, Variable
+from tpm_design.problem import Design, Variable, with_ties
 from tpm_design.study.document import number
 from tpm_design.study.study import Study
 from tpm_design.study.sweep import design_names, design_value
@@ -24,6 +24,8 @@ def choose_design(study: Study, settings: Mapping[str, str]) -> tuple[Design, tu
     names = design_names(problem)
     for name in settings:
         if name not in names:
+            if name in problem.ties:
+                raise tied_error(problem.ties, name)
             raise UsageError(f"this study has no quantity {name!r}", remedy=_remedy(name, names))
     variables = {variable.name: variable for variable in problem.variables}
     design: dict[str, float | str] = {}
@@ -39,7 +41,14 @@ def choose_design(study: Study, settings: Mapping[str, str]) -> tuple[Design, tu
             assumptions.append(f"{name} = {text} ({reason})")
         else:
             design[name] = problem.fixed[name]
-    return design, tuple(assumptions)
+    return with_ties(problem.ties, design), tuple(assumptions)
+
+
+def tied_error(ties: Mapping[str, str], name: str) -> UsageError:
+    """Why a tied parameter cannot be set by itself."""
+    return UsageError(
+        f"{name} equals {ties[name]} in this study", remedy=f"Set {ties[name]}: {name} follows."
+    )
 
 
 def _set_value(study: Study, name: str, text: str) -> float | str:

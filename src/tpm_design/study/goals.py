@@ -59,7 +59,9 @@ class GoalReader:
             )
             return None
         given = self._options(place, metric, entry)
-        options = {option.name: given.get(option.name, self._default(option)) for option in metric.options}
+        options = {
+            option.name: given.get(option.name, self._default(metric, option)) for option in metric.options
+        }
         if metric.needs_region and not self._has_region and options.get("over") != "aspect":
             aspect = " or `over: aspect`" if metric.option("over") else ""
             self._faults.add((*place, "metric"), f"{metric.name} needs a region", f"Add `region:`{aspect}.")
@@ -81,14 +83,12 @@ class GoalReader:
         }
         return Goal(metric, label, in_si, sense, minimum, maximum), plain(written)
 
-    def _choices(self, option: Option) -> tuple[str, ...]:
+    def _choices(self, metric: Metric, option: Option) -> tuple[str, ...]:
         """The choices there are for this mechanism: it may know one drive only."""
-        if option.name != "drive":
-            return option.choices
-        return tuple(choice for choice in option.choices if choice in self._kind.drives)
+        return metric.drives(self._kind) if option.name == "drive" else option.choices
 
-    def _default(self, option: Option) -> Any:
-        choices = self._choices(option)
+    def _default(self, metric: Metric, option: Option) -> Any:
+        choices = self._choices(metric, option)
         return choices[0] if choices and option.default not in choices else option.default
 
     def _options(self, place: Place, metric: Metric, entry: Entry) -> dict[str, Any]:
@@ -103,7 +103,7 @@ class GoalReader:
                 )
                 continue
             try:
-                given[name] = _option_value(option, value, self._choices(option))
+                given[name] = _option_value(option, value, self._choices(metric, option))
             except ValueError as error:
                 self._faults.add(
                     (*place, name), f"{metric.name}: {name} cannot be {shown(value)}", str(error)

@@ -108,15 +108,33 @@ class Values(Strict):
     values: Annotated[tuple[Number, ...], Field(min_length=1), AfterValidator(_distinct)]
 
 
+class Equals(Strict):
+    """``{equals: f}``: a parameter that takes the value of another one."""
+
+    equals: Text
+
+
 def _quantity_form(value: Any) -> str | None:
     if isinstance(value, dict | BaseModel):
         given = value if isinstance(value, dict) else value.model_fields_set
-        return "values" if "values" in given else "range"
+        return next((form for form in ("values", "equals") if form in given), "range")
     return "number"
+
+
+def _free_form(value: Any) -> str | None:
+    form = _quantity_form(value)
+    return "range" if form == "equals" else form
 
 
 Quantity = Annotated[
     Annotated[Number, Tag("number")] | Annotated[Range, Tag("range")] | Annotated[Values, Tag("values")],
+    Discriminator(_free_form),
+]
+ParameterQuantity = Annotated[
+    Annotated[Number, Tag("number")]
+    | Annotated[Range, Tag("range")]
+    | Annotated[Values, Tag("values")]
+    | Annotated[Equals, Tag("equals")],
     Discriminator(_quantity_form),
 ]
 
@@ -134,9 +152,17 @@ class Limits(Strict):
         return self
 
 
+def _limit_form(value: Any) -> str:
+    if isinstance(value, bool):
+        return "switch"
+    return "range" if isinstance(value, dict | BaseModel) else "number"
+
+
 LimitValue = Annotated[
-    Annotated[NonNegative, Tag("number")] | Annotated[Limits, Tag("range")],
-    Discriminator(lambda value: "range" if isinstance(value, dict | BaseModel) else "number"),
+    Annotated[NonNegative, Tag("number")]
+    | Annotated[Limits, Tag("range")]
+    | Annotated[Annotated[bool, Field(strict=True)], Tag("switch")],
+    Discriminator(_limit_form),
 ]
 
 ModeValue = Annotated[
@@ -149,7 +175,7 @@ class MechanismModel(Strict):
     """``mechanism:``"""
 
     type: Text
-    parameters: dict[Text, Quantity]
+    parameters: dict[Text, ParameterQuantity]
     mode: ModeValue | None = None
     limits: dict[Text, LimitValue] = Field(default_factory=dict)
 

@@ -27,7 +27,14 @@ from tpm_design.study.plain import plain
 from tpm_design.study.quantities import interval
 from tpm_design.study.region import read_region
 from tpm_design.study.registries import Registries, registries
-from tpm_design.study.space import free_center, read_center, read_limits, read_mode, read_parameters
+from tpm_design.study.space import (
+    free_center,
+    read_center,
+    read_limits,
+    read_mode,
+    read_parameters,
+    read_ties,
+)
 from tpm_design.study.study import Certification, OptimizerSettings, Study
 from tpm_design.study.sweep import SweepReader
 from tpm_design.units import Units, si_unit
@@ -36,6 +43,12 @@ from tpm_design.units import Units, si_unit
 def load_study(path: str | Path) -> Study:
     """Reads and checks a study file. Raises StudyError: what is wrong, in which line, what to do."""
     document = read_document(Path(path))
+    if "architectures" in document.data:
+        Faults(document).stop(
+            ("architectures",),
+            "this file compares several architectures",
+            "Use it with optimize or validate; a run of one of them is a study for the other commands.",
+        )
     return resolve(document, parse(document), registries())
 
 
@@ -53,12 +66,14 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
     region = model.region
     center = region.center if region else None
     parameters = read_parameters(model.mechanism, kind, units, faults)
+    ties = read_ties(model.mechanism, kind, parameters, faults)
     limits = read_limits(model.mechanism.limits, kind, units, faults)
     certification = _certification(model.certify, kind, units, faults)
     optimizer = _optimizer(model.optimizer, known.optimizers, faults)
     faults.raise_if_any()  # the modes and the centre's bounds follow from the parameters
 
     ranges = {name: interval(quantity) for name, quantity in parameters.items()}
+    ranges |= {name: ranges[source] for name, source in ties.items()}
     modes = read_mode(model.mechanism.mode, kind, ranges, _isotropic(model), faults)
     quantities = dict(parameters)
     shape = written_region = None
@@ -75,7 +90,7 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
     else:
         variables.append(Variable("mode", "mode", values=tuple(modes)))
 
-    reader = GoalReader(known.metrics, kind, units, region is not None, quantities, faults)
+    reader = GoalReader(known.metrics, kind, units, region is not None, (*quantities, *ties), faults)
     objectives = reader.read("objectives", model.objectives)
     constraints = reader.read("constraints", model.constraints)
     record = reader.read("record", model.record)
@@ -90,6 +105,7 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
         constraints=tuple(goal for goal, _ in constraints),
         record=tuple(goal for goal, _ in record),
         accuracy=Accuracy(model.accuracy.volume, model.accuracy.region_samples),
+        ties=ties,
     )
     sweep = written_sweep = None
     if model.sweep is not None:
@@ -103,7 +119,11 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
         "units": model.units,
         "mechanism": {
             "type": kind.name,
-            "parameters": {name: model.mechanism.parameters[name] for name in parameters},
+            "parameters": {
+                name: model.mechanism.parameters[name]
+                for name in kind.parameter_names()
+                if name in parameters or name in ties
+            },
             "mode": mode if isinstance(mode, str) else (next(iter(modes.values())) or None),
             "limits": {name: model.mechanism.limits[name] for name in limits},
         },

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping
 from typing import Any
 
 from tpm_design.mechanisms.base import MechanismKind
@@ -66,6 +67,13 @@ def _mechanisms(definition: Schema, known: Registries) -> None:
     ]
 
 
+_LIMITS: Mapping[str, Schema] = {
+    "range": {"$ref": "#/$defs/Limits"},
+    "number": {"type": "number", "minimum": 0},
+    "switch": {"type": "boolean"},
+}
+
+
 def _mechanism(kind: MechanismKind, definition: Schema) -> Schema:
     quantity = definition["properties"]["parameters"]["additionalProperties"]
     parameters: Schema = {}
@@ -81,7 +89,7 @@ def _mechanism(kind: MechanismKind, definition: Schema) -> Schema:
     limits = {
         limit.name: {
             "description": limit.description,
-            **({"$ref": "#/$defs/Limits"} if limit.kind == "range" else {"type": "number", "minimum": 0}),
+            **_LIMITS[limit.kind],
         }
         for limit in kind.limits
     }

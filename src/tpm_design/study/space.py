@@ -12,8 +12,15 @@ from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter
 from tpm_design.problem import Variable
 from tpm_design.study.document import Place
 from tpm_design.study.faults import Faults, shown
-from tpm_design.study.model import Center, LimitValue, MechanismModel, Quantity, Range
-from tpm_design.study.quantities import CENTER, meaning, read_quantity
+from tpm_design.study.model import Center, Equals, Limits, LimitValue, MechanismModel, Quantity, Range
+from tpm_design.study.quantities import (
+    CENTER,
+    domain_words,
+    interval,
+    meaning,
+    read_quantity,
+    within,
+)
 from tpm_design.units import Units, si_unit
 
 Modes = dict[str, dict[str, str]]
@@ -35,11 +42,65 @@ def read_parameters(
         _check_given(parameter, kind, model.parameters, faults)
     found: dict[str, float | Variable] = {}
     for name in kind.parameter_names():
-        if name in model.parameters:
+        given = model.parameters.get(name)
+        if given is not None and not isinstance(given, Equals):
             dimension, domain = meaning(name, kind)
             place = (*_PARAMETERS, name)
-            found[name] = read_quantity(name, model.parameters[name], dimension, domain, place, units, faults)
+            found[name] = read_quantity(name, given, dimension, domain, place, units, faults)
     return found
+
+
+def read_ties(
+    model: MechanismModel,
+    kind: MechanismKind,
+    quantities: Mapping[str, float | Variable],
+    faults: Faults,
+) -> dict[str, str]:
+    """Tied parameters → the ones they equal. ``quantities``: the others, SI."""
+    found: dict[str, str] = {}
+    for name in kind.parameter_names():
+        given = model.parameters.get(name)
+        if not isinstance(given, Equals):
+            continue
+        wrong = _tie_fault(name, given.equals, model, kind, quantities)
+        if wrong is None:
+            found[name] = given.equals
+        else:
+            faults.add((*_PARAMETERS, name, "equals"), *wrong)
+    return found
+
+
+def _tie_fault(
+    name: str,
+    source: str,
+    model: MechanismModel,
+    kind: MechanismKind,
+    quantities: Mapping[str, float | Variable],
+) -> tuple[str, str] | None:
+    """What is wrong with ``name: {equals: source}`` and what to do about it, or None."""
+    if source == name:
+        return f"{name} equals itself", "Name another parameter, or give a number or a range."
+    further = model.parameters.get(source)
+    if isinstance(further, Equals):
+        return f"{name} equals {source}, which itself equals {further.equals}", "Name the last one directly."
+    if source not in quantities:
+        return (
+            f"{name} equals {shown(source)}, which this study does not give",
+            did_you_mean(source, quantities),
+        )
+    (dimension, domain), (other, _) = meaning(name, kind), meaning(source, kind)
+    if dimension != other:
+        return f"{name} is {_a(dimension)} and {source} is {_a(other)}", "Name one of the same kind."
+    if not within(domain, *interval(quantities[source])):
+        return (
+            f"{name} cannot take every value of {source}",
+            f"{name} must be {domain_words(domain)}: change the range of {source}.",
+        )
+    return None
+
+
+def _a(dimension: str) -> str:
+    return f"an {dimension}" if dimension == "angle" else f"a {dimension}"
 
 
 def _check_given(parameter: Parameter, kind: MechanismKind, given: Mapping[str, Any], faults: Faults) -> None:
@@ -53,6 +114,8 @@ def _check_given(parameter: Parameter, kind: MechanismKind, given: Mapping[str, 
             f"{name} sets all limbs and {single[0]} one of them",
             f"Keep {name}, or give {', '.join(limbs)} instead.",
         )
+    elif name not in given and not single and parameter.default is not None:
+        pass
     elif name not in given and len(single) < max(len(limbs), 1):
         missing = [limb for limb in limbs if limb not in single] if single else [name]
         faults.add(
@@ -62,10 +125,23 @@ def _check_given(parameter: Parameter, kind: MechanismKind, given: Mapping[str, 
         )
 
 
+_LIMIT_FORMS = {
+    "range": ("a range", "Write {min: …, max: …}."),
+    "number": ("one number", "Write it without min and max."),
+    "switch": ("a switch", "Write true or false."),
+}
+
+
+def _limit_form(value: LimitValue) -> str:
+    if isinstance(value, bool):
+        return "switch"
+    return "range" if isinstance(value, Limits) else "number"
+
+
 def read_limits(
     given: Mapping[str, LimitValue], kind: MechanismKind, units: Units, faults: Faults
 ) -> dict[str, Any]:
-    """Limits by name: (lowest, highest) or one number, SI."""
+    """Limits by name: (lowest, highest), one number or a switch, SI."""
     declared = {limit.name: limit for limit in kind.limits}
     for name in given:
         if name not in declared:
@@ -76,17 +152,13 @@ def read_limits(
         if name not in given:
             continue
         value, unit = given[name], si_unit(limit.dimension)
-        if limit.kind == "range":
-            if isinstance(value, float):
-                faults.add(("mechanism", "limits", name), f"{name} is a range", "Write {min: …, max: …}.")
-            else:
-                found[name] = (units.to_si(value.min, unit), units.to_si(value.max, unit))
-        elif isinstance(value, float):
-            found[name] = units.to_si(value, unit)
+        if _limit_form(value) != limit.kind:
+            what, remedy = _LIMIT_FORMS[limit.kind]
+            faults.add(("mechanism", "limits", name), f"{name} is {what}", remedy)
+        elif isinstance(value, Limits):
+            found[name] = (units.to_si(value.min, unit), units.to_si(value.max, unit))
         else:
-            faults.add(
-                ("mechanism", "limits", name), f"{name} is one number", "Write it without min and max."
-            )
+            found[name] = value if isinstance(value, bool) else units.to_si(value, unit)
     return found
 
 

@@ -15,6 +15,7 @@ from tpm_design.study.registries import registries
 from tpm_design.units import Units, si_unit
 
 _UNITS = Units("mm", "deg")
+_LIMITS = {"range": "{min: …, max: …}", "number": "…", "switch": "true or false"}
 
 
 def template(name: str, kind: MechanismKind) -> str:
@@ -26,12 +27,12 @@ def template(name: str, kind: MechanismKind) -> str:
     if not re.fullmatch(NAME, name):
         raise UsageError(f"a study cannot have the name {shown(name)}", remedy=NAME_REMEDY)
     free = [p for p in kind.parameters if p.domain == "positive" and p.dimension == "length"]
-    lines = [_parameter(parameter, kind, parameter in free) for parameter in kind.parameters]
+    given = [parameter for parameter in kind.parameters if parameter.name in kind.example]
+    lines = [_parameter(parameter, kind, parameter in free) for parameter in given]
     signs = ", ".join(f'{field.name}: "{"+" * field.length}"' for field in kind.mode_fields)
     mode = f"\n  mode: {{{signs}}}     # or `best`: every inequivalent working mode is tried" if signs else ""
     limits = "\n".join(
-        f"  #   {limit.name}: {'{min: …, max: …}' if limit.kind == 'range' else '…'}    {limit.description}"
-        for limit in kind.limits
+        f"  #   {limit.name}: {_LIMITS[limit.kind]}    {limit.description}" for limit in kind.limits
     )
     limits = f"\n  # limits there are:\n{limits}" if limits else ""
     reach = kind.farthest_reach({parameter: (value, value) for parameter, value in kind.example.items()})

@@ -8,9 +8,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.arithmetic import inner, kernel
+from tpm_design.arithmetic import kernel
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.directions import ALL_OCTANTS, Octant, RaySet, ray_set
+from tpm_design.workspace.joined_sets import find, join
 from tpm_design.workspace.poses import aspect_code
 from tpm_design.workspace.rays import Segments, trace
 from tpm_design.workspace.region_geometry import BOX, CYLINDER, PlacedRegion
@@ -37,14 +38,6 @@ class RayField:
         return int(np.argmax(self.volumes)) if self.volumes.size else None
 
 
-@inner
-def _find(parent, item):  # type: ignore[no-untyped-def]
-    while parent[item] != item:
-        parent[item] = parent[parent[item]]
-        item = parent[item]
-    return item
-
-
 @kernel
 def _components(rays, start, end, code, neighbours, weights):  # type: ignore[no-untyped-def]
     """Join segments of neighbouring rays that have one code and overlap; number the sets in order.
@@ -62,12 +55,12 @@ def _components(rays, start, end, code, neighbours, weights):  # type: ignore[no
         for i in range(first[a], first[a + 1]):
             for j in range(first[b], first[b + 1]):
                 if code[i] == code[j] and max(start[i], start[j]) <= min(end[i], end[j]):
-                    parent[_find(parent, i)] = _find(parent, j)
+                    join(parent, i, j)
     component = np.full(start.size, -1, np.int64)
     volumes = np.zeros(start.size)
     count = 0
     for item in range(start.size):
-        root = _find(parent, item)
+        root = find(parent, item)
         if component[root] < 0:
             component[root] = count
             count += 1

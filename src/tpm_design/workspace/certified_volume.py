@@ -15,11 +15,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from tpm_design.arithmetic.rounding import check_rounding
-from tpm_design.errors import ParameterError, did_you_mean
+from tpm_design.errors import ParameterError
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.paved_components import largest_part
 from tpm_design.workspace.paving import PavedSet, Paving
-from tpm_design.workspace.volume import VolumeKind
+from tpm_design.workspace.volume import VolumeKind, check_asked
 
 # digits are lost to underflow below it
 LEAST_MARGIN = 1e-290
@@ -71,12 +71,7 @@ def certified_volume(
     Raises ParameterError on an unknown kind, a margin outside [0, 1), an rtol outside [1e-6, 1), or limits
     or threads that are not positive.
     """
-    if kind not in ("reachable", "singularity_free"):
-        raise ParameterError(
-            f"Unknown kind of volume {kind!r}.", remedy=did_you_mean(kind, ("reachable", "singularity_free"))
-        )
-    if not 0.0 <= margin < 1.0:
-        raise ParameterError(f"margin = {margin!r} is not in [0, 1).", remedy="Margins are dimensionless.")
+    check_asked(kind, margin)
     if not 1e-6 <= rtol < 1.0:
         raise ParameterError(f"rtol = {rtol!r} is not in [1e-6, 1).")
     if seconds is not None and not seconds > 0.0:

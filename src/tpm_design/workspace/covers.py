@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.arithmetic import Interval, formula, inner, kernel, variables
+from tpm_design.arithmetic.interval import up
 from tpm_design.arithmetic.lifting import lifted, seeded
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
@@ -83,7 +84,7 @@ def _worst_end(slope, lo, hi):  # type: ignore[no-untyped-def]
     if slope.hi <= 0.0:
         return hi, 0.0
     middle = min(hi, max(lo, 0.5 * (lo + hi)))
-    return middle, (Interval(max(hi - middle, middle - lo), 0.0 + max(hi - middle, middle - lo)) * 1.0).hi
+    return middle, up(max(hi - middle, middle - lo))
 
 
 class Exact(NamedTuple):

@@ -11,29 +11,12 @@ import numpy as np
 
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.workspace.box_verdicts import EVERY_CORNER
+from tpm_design.workspace.joined_sets import find, join
 from tpm_design.workspace.paving import Paving
 
 # pairs of boxes on the way down two trees: every step replaces one by two
 STACK = 512
 S, U, V = 0, 1, 2
-
-
-@inner
-def _find(parent, item):  # type: ignore[no-untyped-def]
-    while parent[item] != item:
-        parent[item] = parent[parent[item]]
-        item = parent[item]
-    return item
-
-
-@inner
-def _join(parent, a, b):  # type: ignore[no-untyped-def]
-    first, second = _find(parent, a), _find(parent, b)
-    # the older box leads, whatever the order in which pairs are met
-    if first < second:
-        parent[second] = first
-    else:
-        parent[first] = second
 
 
 @inner
@@ -105,9 +88,9 @@ def _meet(tree, traits, inside, parents, pairs, limits, point, face, other):  # 
             depth = _step(tree, pairs, limits, depth, 1, axis2, side2, along2)
         else:
             if (closed[a] >> (2 * axis + side) | closed[b] >> (2 * axis2 + side2)) & 1 == 0:
-                _join(upper, a, b)
+                join(upper, a, b)
             if corners[a] & corners[b] == EVERY_CORNER:
-                _join(lower, a, b)
+                join(lower, a, b)
             elif corners[a] > 0 and corners[b] > 0:
                 for corner in range(4):
                     for k in range(2):
@@ -116,7 +99,7 @@ def _meet(tree, traits, inside, parents, pairs, limits, point, face, other):  # 
                     if _corner_proved(corners[a], axis, side, along, box, point) and _corner_proved(
                         corners[b], axis2, side2, along2, box2, point
                     ):
-                        _join(lower, a, b)
+                        join(lower, a, b)
                         break
 
 
@@ -125,7 +108,7 @@ def _largest(parent, child, inside, column):  # type: ignore[no-untyped-def]
     totals = np.zeros(parent.size)
     for node in range(parent.size):
         if child[node] < 0:
-            totals[_find(parent, node)] += inside[node, column]
+            totals[find(parent, node)] += inside[node, column]
     return totals.max()
 
 

@@ -8,12 +8,15 @@ from tpm_design.arithmetic import Interval, inner, kernel
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace import statements
+from tpm_design.workspace.fold_clearance import fold_clearance
 from tpm_design.workspace.region_geometry import PlacedRegion, signed_distance_at
 
 Pose = tuple[float, float, float]
 
 # a determinant of unit rows that is proved to be smaller counts as zero
 SINGULAR = 1e-12
+# share of the reach that a line must enter a region by to be called inside
+FOLD_DEPTH = 1e-9
 # half lengths, as shares of the reach, of the segments on which a determinant is shown to change its sign
 SEGMENTS = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 
@@ -67,6 +70,17 @@ def fails_at(statement: Any, mechanism: Mechanism, mode: Mode, pose: Pose) -> bo
         # both matrices fail at one scale: a larger one leaves the first, a smaller one the second negative
         return any(negative[:3]) and any(negative[3:])
     return any(negative)
+
+
+def folded_inside(mechanism: Mechanism, region: PlacedRegion) -> Pose | None:
+    """A pose in the interior of the region at which a limb of this machine is folded, to rounding: farther
+    from the region's surface than any rounding of it and of the line; None where there is no such line."""
+    depth = FOLD_DEPTH * mechanism.reach_radius()
+    for line in mechanism.fold_lines():
+        found = fold_clearance(region, line)
+        if found.value + line.radius < -depth:
+            return found.pose
+    return None
 
 
 def singular_near(

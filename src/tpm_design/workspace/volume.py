@@ -33,6 +33,15 @@ def coarser(order: int) -> int:
     return max(3, (2 * order) // 3)
 
 
+def check_asked(kind: str, margin: float) -> None:
+    """Raises ParameterError on an unknown kind of volume or a margin that is no number in [0, 1)."""
+    kinds = ("reachable", "singularity_free")
+    if kind not in kinds:
+        raise ParameterError(f"Unknown kind of volume {kind!r}.", remedy=did_you_mean(str(kind), kinds))
+    if not isinstance(margin, int | float) or not 0.0 <= margin < 1.0:
+        raise ParameterError(f"margin = {margin!r} is not in [0, 1).", remedy="Margins are dimensionless.")
+
+
 def workspace_volume(
     mechanism: Mechanism,
     mode: Mode,
@@ -45,12 +54,7 @@ def workspace_volume(
 
     Raises ParameterError on an unknown kind, a margin outside [0, 1) or an rtol outside [1e-6, 0.1].
     """
-    if kind not in ("reachable", "singularity_free"):
-        raise ParameterError(
-            f"Unknown kind of volume {kind!r}.", remedy=did_you_mean(kind, ("reachable", "singularity_free"))
-        )
-    if not 0.0 <= margin < 1.0:
-        raise ParameterError(f"margin = {margin!r} is not in [0, 1).", remedy="Margins are dimensionless.")
+    check_asked(kind, margin)
     if not 1e-6 <= rtol <= 0.1:
         raise ParameterError(f"rtol = {rtol!r} is not in [1e-6, 0.1].")
     order = rays_for(rtol)

@@ -13,7 +13,7 @@ from tpm_design.checker.mechanisms.mechanism import LimitValue
 
 QUARTER = math.pi / 2.0
 SAME_ANGLE = 1e-15
-"""Relative: a multiple of 90° as a float is meant to be one."""
+"""Rounding of an angle written in degrees: a multiple of 90° is meant to be one."""
 QUARTERS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 Vector = tuple[arb, arb, arb]
@@ -27,7 +27,7 @@ class Angle(NamedTuple):
 def exact_angle(value: float) -> Angle:
     """Of an angle (rad) without tolerance: 0 and ±1 exactly at multiples of 90°."""
     quarters = round(value / QUARTER)
-    if abs(value - quarters * QUARTER) <= SAME_ANGLE * abs(value):
+    if abs(value - quarters * QUARTER) <= SAME_ANGLE * max(1.0, abs(value)):
         cos, sin = QUARTERS[quarters % 4]
         return Angle(arb(cos), arb(sin))
     return Angle(arb(value).cos(), arb(value).sin())

@@ -103,7 +103,8 @@ class Cylindrical(Configuration):
         return Links(f, r, rho, cos)
 
     def margin(self, which: Margin) -> Enclosure:
-        """f_i + r_i − ρ_i and ρ_i − |f_i − r_i|; the stroke; the angle of the elbow by its cosine."""
+        """f_i + r_i − ρ_i and ρ_i − |f_i − r_i|, times |s_i·d_i|, as ρ_i grows by at most 1/|s_i·d_i| of
+        the way of the pose; the stroke; the angle of the elbow by its cosine."""
         name, limb = which
         if name.startswith("stroke"):
             travel = combination(self.setting.lines[limb].travel, self._reached(limb))
@@ -113,7 +114,8 @@ class Cylindrical(Configuration):
         if name.startswith("elbow"):
             bound = constant(self.setting.bounds[name])
             return bound - cos if name == "elbow min" else cos - bound
-        return f + r - rho if name == "stretched" else rho - magnitude(f - r)
+        spare = f + r - rho if name == "stretched" else rho - magnitude(f - r)
+        return spare.times(abs(self.setting.lines[limb].driven))
 
     def unit_determinant(self, name: str) -> Enclosure:
         """det[s_1 s_2 s_3], and that of the normals n_i of s_i and t_i."""
@@ -132,8 +134,8 @@ class Cylindrical(Configuration):
         return constant(ONE) - square(self.links[limb].elbow_cosine)
 
     def input_transmission_squared(self, limb: int) -> Enclosure:
-        """A limb is pushed along its own row."""
-        return constant(ONE)
+        """s_i·d_i: along its own row where the joint is a C joint."""
+        return square(constant(self.setting.lines[limb].driven))
 
     def length_error_gain_squared(self, limb: int) -> Enclosure:
         """s_i·dx = s_i·(da_i0 − db_i): the links matter to reach alone."""

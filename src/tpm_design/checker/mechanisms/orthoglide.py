@@ -2,7 +2,8 @@
 
 Source: D. Chablat and P. Wenger, "Architecture optimization of a 3-DOF translational parallel mechanism for
 machining applications, the Orthoglide", IEEE Trans. Robotics and Automation 19(3), 403–410, 2003.
-q_i = p_i ± √(L² − p_j² − p_k²), the carriage ahead of the platform or behind it.
+q_i = p_i + d_i ± √(L² − p_j² − p_k²), the carriage ahead of the platform or behind it, with d_i the distance
+of the platform's joint from its point along the rail.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ class Orthoglide(Pushing):
             widest = length.times(self.setting.swing or ONE)
             return square(widest) - square(first) - square(second)
         sign = arb(self.setting.carriages[limb])
-        position = self.pose[limb] + (length * self.struts[limb].along).times(sign)
+        position = self.pose[limb] + self.size("d", limb) + (length * self.struts[limb].along).times(sign)
         low, high = self.setting.stroke or (0.0, 0.0)
         return position - constant(arb(low)) if name == "stroke min" else constant(arb(high)) - position
 
@@ -70,8 +71,8 @@ class Orthoglide(Pushing):
         return Push(placed(limb, own, first, second), own, squared)
 
     def length_error_gain_squared(self, limb: int) -> Enclosure:
-        """s·dx = dL."""
-        return constant(ONE)
+        """s·dx = −(s·e) dd + dL."""
+        return self.struts[limb].along_squared + constant(ONE)
 
 
 def describe(made: Made) -> tuple[Setting, Sizes]:
@@ -87,12 +88,12 @@ def describe(made: Made) -> tuple[Setting, Sizes]:
         stroke=stroke,
         swing=swing,
     )
-    return setting, made.spans("L")
+    return setting, made.spans("L", "d")
 
 
 ORTHOGLIDE = Mechanism(
     name="orthoglide",
-    parameters=(Parameter("L", LENGTH, "positive"),),
+    parameters=(Parameter("L", LENGTH, "positive"), Parameter("d", LENGTH, "any", (0.0, 0.0, 0.0))),
     mode=(ModeField("carriages"),),
     limits={
         "stroke": Limit("range", LENGTH),

@@ -1,0 +1,171 @@
+"""Three limbs, each a carriage on a straight rail and a strut from it to the platform.
+
+With the carriage at anchor_i + q_i u_i, shifted by the platform's joint, |w_i − q_i u_i| = l_i for
+w_i = p − anchor_i. The strut's part along the rail is ± h_i, h_i² = l_i² − |w_i × u_i|².
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from numpy.typing import ArrayLike
+
+from tpm_design.arithmetic import formula, magnitude, root, sqr
+from tpm_design.mechanisms import equations, forward
+from tpm_design.mechanisms.angles import EnclosedVector
+from tpm_design.mechanisms.assembly import Assembly
+from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.mechanisms.parameters import three_numbers
+from tpm_design.mechanisms.spheres import sphere_intersection
+
+Triple = tuple[float, ...]
+
+
+class CarriageSigns(NamedTuple):
+    """A working mode: on which side of the platform each carriage is, +1 or −1."""
+
+    carriages: Triple
+
+
+def anchor(geometry, limb):  # type: ignore[no-untyped-def]
+    """Where the carriage at q = 0 is, less where the platform's joint is (m)."""
+    raise NotImplementedError
+
+
+def along_rail(geometry, limb, side):  # type: ignore[no-untyped-def]
+    """Sign of the strut's part along the rail, from the carriage to the platform."""
+    raise NotImplementedError
+
+
+def swing_margin(geometry, limb, w, h):  # type: ignore[no-untyped-def]
+    """Metres, ≥ 0 within the limit of the strut's swing."""
+    raise NotImplementedError
+
+
+def limb_strut(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
+    """w × u, its length, h and w of one limb, see the implementation."""
+    raise NotImplementedError
+
+
+def limb_row(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+    """Unit row s_i and b_i = s_i · u_i of one limb, see the implementation."""
+    raise NotImplementedError
+
+
+def limb_carriage(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+    """Position q_i of one carriage on its rail (m), see the implementation."""
+    raise NotImplementedError
+
+
+def _limb_strut(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
+    ax, ay, az = anchor(geometry, limb)
+    ux, uy, uz = geometry.rail[limb]
+    wx, wy, wz = x - ax, y - ay, z - az
+    # the cross product has no cancellation where the rail is along an axis
+    cx, cy, cz = wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux
+    square = sqr(cx) + sqr(cy) + sqr(cz)
+    return (cx, cy, cz), root(square), root(sqr(geometry.strut[limb]) - square), (wx, wy, wz)
+
+
+def _limb_row(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+    (cx, cy, cz), _, h, _ = limb_strut(geometry, limb, x, y, z)
+    ux, uy, uz = geometry.rail[limb]
+    length = geometry.strut[limb]
+    b = along_rail(geometry, limb, side) * h
+    row = ((uy * cz - uz * cy + b * ux), (uz * cx - ux * cz + b * uy), (ux * cy - uy * cx + b * uz))
+    return (row[0] / length, row[1] / length, row[2] / length), b / length
+
+
+def _limb_carriage(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+    _, _, h, w = limb_strut(geometry, limb, x, y, z)
+    ux, uy, uz = geometry.rail[limb]
+    return w[0] * ux + w[1] * uy + w[2] * uz - along_rail(geometry, limb, side) * h
+
+
+def _leg_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """l_i − |w_i × u_i|."""
+    _, across1, _, _ = limb_strut(geometry, 0, x, y, z)
+    _, across2, _, _ = limb_strut(geometry, 1, x, y, z)
+    _, across3, _, _ = limb_strut(geometry, 2, x, y, z)
+    l1, l2, l3 = geometry.strut
+    return l1 - across1, l2 - across2, l3 - across3
+
+
+def _mode_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """Both ends of each rail, then the swing of each strut."""
+    k1, k2, k3 = mode.carriages
+    _, _, h1, w1 = limb_strut(geometry, 0, x, y, z)
+    _, _, h2, w2 = limb_strut(geometry, 1, x, y, z)
+    _, _, h3, w3 = limb_strut(geometry, 2, x, y, z)
+    swing1, swing2, swing3 = (
+        swing_margin(geometry, 0, w1, h1),
+        swing_margin(geometry, 1, w2, h2),
+        swing_margin(geometry, 2, w3, h3),
+    )
+    if geometry.limited == 0.0:
+        return swing1, swing2, swing3, swing1, swing2, swing3, swing1, swing2, swing3
+    q1 = limb_carriage(geometry, 0, k1, x, y, z)
+    q2 = limb_carriage(geometry, 1, k2, x, y, z)
+    q3 = limb_carriage(geometry, 2, k3, x, y, z)
+    low1, low2, low3 = geometry.lowest
+    high1, high2, high3 = geometry.highest
+    return q1 - low1, high1 - q1, q2 - low2, high2 - q2, q3 - low3, high3 - q3, swing1, swing2, swing3
+
+
+def _unit_velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
+    """s_i · ẋ = (s_i · u_i) q̇_i: the strut keeps its length."""
+    k1, k2, k3 = mode.carriages
+    row1, b1 = limb_row(geometry, 0, k1, x, y, z)
+    row2, b2 = limb_row(geometry, 1, k2, x, y, z)
+    row3, b3 = limb_row(geometry, 2, k3, x, y, z)
+    return (row1, row2, row3), (b1, b2, b3), (1.0, 1.0, 1.0)
+
+
+def _serial_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """|s_i · u_i|: 0 where a strut is square to its rail."""
+    _, (b1, b2, b3), _ = equations.unit_velocity_map(geometry, mode, 1.0, x, y, z)
+    return magnitude(b1), magnitude(b2), magnitude(b3)
+
+
+def _actuators(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
+    """q_i (m)."""
+    k1, k2, k3 = mode.carriages
+    return (
+        limb_carriage(geometry, 0, k1, x, y, z),
+        limb_carriage(geometry, 1, k2, x, y, z),
+        limb_carriage(geometry, 2, k3, x, y, z),
+    )
+
+
+def rail_equations(geometry_class: type) -> None:
+    """Register what all mechanisms of this kind have in common for a geometry with ``rail`` (unit vectors),
+    ``strut``, ``limited``, ``lowest`` and ``highest``. It gives ``anchor``, ``along_rail`` and
+    ``swing_margin`` itself."""
+    formula(limb_strut, geometry_class)(_limb_strut)
+    formula(limb_row, geometry_class)(_limb_row)
+    formula(limb_carriage, geometry_class)(_limb_carriage)
+    formula(equations.leg_margins, geometry_class)(_leg_margins)
+    formula(equations.mode_margins, geometry_class)(_mode_margins)
+    formula(equations.unit_velocity_map, geometry_class)(_unit_velocity_map)
+    formula(equations.serial_margins, geometry_class)(_serial_margins)
+    formula(equations.actuators, geometry_class)(_actuators)
+
+
+def rail_assemblies(
+    mechanism: Mechanism, anchors: Sequence[EnclosedVector], q: ArrayLike, mode: Mode | None, drive: str
+) -> tuple[Assembly, ...]:
+    """Every real assembly for carriage positions ``q`` (3,) in metres, of all working modes or of ``mode``:
+    the points at the struts' lengths from anchor_i + q_i u_i."""
+    mechanism.motor_weight(drive)
+    positions = three_numbers(q, "q", "Give three carriage positions in m.")
+    enclosed = mechanism.enclosed_geometry({})
+    centres = [
+        [a + float(position) * u for a, u in zip(anchor_i, rail, strict=True)]
+        for anchor_i, rail, position in zip(anchors, enclosed.rail, positions, strict=True)
+    ]
+    found = sphere_intersection(centres, enclosed.strut)
+    sides = itertools.product((1.0, -1.0), repeat=3)
+    modes = [CarriageSigns(signs) for signs in sides] if mode is None else [mode.signs]
+    return forward.confirmed(mechanism, found, modes, positions, 1.0, 0.0)
