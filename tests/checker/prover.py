@@ -13,7 +13,8 @@ from typing import Any
 
 from tpm_design.checker.claims import KINDS, read_machine, read_region
 from tpm_design.checker.fields import Fields, canonical_sha256
-from tpm_design.checker.proof import Machines, all_positive, halves, in_octant, out_of_reach, spans_of
+from tpm_design.checker.mechanisms.configuration import Machines
+from tpm_design.checker.proof import all_positive, halves, on_its_sides, out_of_reach, spans_of
 from tpm_design.checker.regions import Box, Domain
 from tpm_design.checker.statements import Length, Locus, Reach, Statement
 from tpm_design.study import load_study
@@ -142,10 +143,11 @@ def in_si(metric: str, value: float | None) -> float | None:
 def prove(certificate: Certificate) -> Certificate:
     """The certificate with covers of all its statements, and its hashes."""
     fields = Fields(certificate, "certificate.json")
-    machines, region = read_machine(fields).within_tolerance(), read_region(fields)
+    machine, region = read_machine(fields), read_region(fields)
+    machines = machine.within_tolerance()
     assert region is not None
     for data, entry in zip(certificate["statements"], fields.entries("statements"), strict=True):
-        statement = KINDS[data["kind"]](entry)
+        statement = KINDS[data["kind"]](entry, machine.mechanism)
         if isinstance(statement, Length):
             continue
         distance = statement.distance if isinstance(statement, Locus) else 0.0
@@ -172,7 +174,7 @@ def letters(statement: Statement, machines: Machines, domain: Domain, box: Box, 
     if domain.outside(box):
         return ["o"]
     spans = spans_of(machines, box)
-    in_mode = not isinstance(statement, Reach) or in_octant(machines.mode, box)
+    in_mode = not isinstance(statement, Reach) or on_its_sides(machines, box)
     if in_mode and all_positive(statement, machines, spans):
         return ["p"]
     if isinstance(statement, Locus) and out_of_reach(machines, box, spans):

@@ -13,7 +13,9 @@ from numba import njit
 from tpm_design.checker.balls import Enclosure, Symmetric, constant, full, wide_product
 from tpm_design.checker.claims import Machine
 from tpm_design.checker.definite import congruent, positive_definite, positive_definite_throughout
-from tpm_design.checker.proof import Machines, all_positive, graded, natural, proved, spans_of
+from tpm_design.checker.mechanisms import MECHANISMS
+from tpm_design.checker.mechanisms.configuration import Machines
+from tpm_design.checker.proof import all_positive, graded, natural, proved, spans_of
 from tpm_design.checker.regions import Box, Domain, Region
 from tpm_design.checker.spectrum import eigenpairs, singular_pairs, unit_frame
 from tpm_design.checker.statements import (
@@ -30,7 +32,6 @@ from tpm_design.checker.statements import (
     Statement,
     Transmission,
 )
-from tpm_design.checker.uru import Configuration
 from tpm_design.mechanisms import mechanism_kind
 from tpm_design.workspace.indices import (
     CONDITION_2,
@@ -52,6 +53,10 @@ from tpm_design.workspace.regions import Cylinder, Ellipsoid, Shape
 LIMITS = {"theta1": (-2.0, 2.6), "theta2": (-1.5, 3.5), "theta3": (-2.9, 2.9), "theta4": (-2.8, 2.7)}
 
 
+def uru(parameters: Any, tolerance: Any, limits: Any, octant: str, elbows: str) -> Machine:
+    return Machine(MECHANISMS["uru"], parameters, tolerance, limits, {"octant": octant, "elbows": elbows})
+
+
 def random_machine(random: np.random.Generator, limits: dict[str, Any]) -> Machine:
     signs = ["".join(random.choice(["+", "-"], 3)) for _ in range(2)]
     values: dict[str, list[float]] = {
@@ -63,14 +68,14 @@ def random_machine(random: np.random.Generator, limits: dict[str, Any]) -> Machi
     }
     parameters = {name: (three[0], three[1], three[2]) for name, three in values.items()}
     tolerance = {"db": 1e-3, "f": 2e-3, "r1": 1e-3, "k": 1e-3}
-    return Machine(parameters, tolerance, limits, signs[0], signs[1])
+    return uru(parameters, tolerance, limits, signs[0], signs[1])
 
 
 def reachable_pose(random: np.random.Generator, machine: Machine) -> tuple[Any, Any, np.ndarray]:
     """The package's mechanism and mode, and a pose well inside its reach."""
     built = mechanism_kind("uru").build(machine.parameters, machine.limits)
-    mode = built.mode_of({"octant": machine.octant, "elbows": machine.elbows})
-    sides = np.asarray([1.0 if sign == "+" else -1.0 for sign in machine.octant])
+    mode = built.mode_of(machine.mode)
+    sides = np.asarray([1.0 if sign == "+" else -1.0 for sign in machine.mode["octant"]])
     poses = random.uniform(0.1, 0.8, (4000, 3)) * sides
     reach = built.margins(poses, mode)["reach"]
     return built, mode, poses[reach > 0.03]
@@ -90,21 +95,17 @@ def quantities(machines: Machines) -> dict[str, Goal]:
                     lambda at, d=drive, i=i, j=j: at.velocity(d).rows[i][j]  # type: ignore[misc]
                 )
     for i in range(3):
-        found[f"serial{i}"] = lambda at, i=i: at.elbow_sine_squared(i)  # type: ignore[misc]
+        found[f"serial{i}"] = lambda at, i=i: at.serial_squared(i)  # type: ignore[misc]
         found[f"gain{i}"] = lambda at, i=i: at.length_error_gain_squared(i)  # type: ignore[misc]
-        for end in (0, 1):
-            found[f"leg{i}{end}"] = lambda at, i=i, end=end: at.leg_margins(i)[end]  # type: ignore[misc]
-        for limit in machines.limits:
-            found[f"{limit.joint} {i}"] = (
-                lambda at, i=i, limit=limit: at.limit_margin(i, limit)  # type: ignore[misc]
-            )
+    for which in (*machines.setting.reach, *machines.setting.within):
+        found[f"{which.name}{which.limb}"] = lambda at, w=which: at.margin(w)  # type: ignore[misc]
     return found
 
 
 def package_values(machine: Machine, parameters: Any, pose: np.ndarray) -> dict[str, float]:
     """The same quantities from the package's mechanism, as far as it gives them singly."""
     built = mechanism_kind("uru").build(parameters, machine.limits)
-    mode = built.mode_of({"octant": machine.octant, "elbows": machine.elbows})
+    mode = built.mode_of(machine.mode)
     margins = built.margins(pose, mode)
     found = {name: float(margins[name][0]) for name in ("translation", "actuation", "rotation")}
     centres = built.joint_centres(pose, mode)
@@ -112,7 +113,7 @@ def package_values(machine: Machine, parameters: Any, pose: np.ndarray) -> dict[
         base, elbow, end = centres[i]
         rho = float(np.linalg.norm(end - base))
         f, r = parameters["f"][i], parameters["r"][i]
-        found |= {f"leg{i}0": f + r - rho, f"leg{i}1": rho - abs(f - r)}
+        found |= {f"stretched{i}": f + r - rho, f"folded{i}": rho - abs(f - r)}
         distal, proximal = (end - elbow) / r, (elbow - base) / f
         found |= {f"joint a{i}{j}": float(distal[j]) for j in range(3)}
         found[f"serial{i}"] = 1.0 - float(distal @ proximal) ** 2
@@ -158,7 +159,7 @@ def test_balls_hold_the_values_of_machines_and_poses_within(half: float) -> None
             }
             pose = poses[0] + half * random.uniform(-1.0, 1.0, 3)
             built = mechanism_kind("uru").build(parameters, {})
-            mode = built.mode_of({"octant": machine.octant, "elbows": machine.elbows})
+            mode = built.mode_of(machine.mode)
             if not built.margins(pose, mode)["reach"][0] > 1e-3:
                 continue
             known = quantities(machines)
@@ -185,10 +186,7 @@ def test_slopes_hold_the_differences_between_any_two_points() -> None:
         for _ in range(2):
             share = {name: arb(random.uniform(0.0, 1.0)) for name in spans}
             ends.append({n: s.low + share[n] * (s.high - s.low) for n, s in spans.items()})
-        first, second = (
-            Configuration(machines.mode, machines.limits, {n: Enclosure(v, {}) for n, v in end.items()})
-            for end in ends
-        )
+        first, second = (machines.at({n: Enclosure(v, {}) for n, v in end.items()}) for end in ends)
         for name, quantity in quantities(machines).items():
             spread = sum(
                 (part * (ends[1][v] - ends[0][v]) for v, part in quantity(slopes).slope.items()), arb(0)
@@ -267,9 +265,9 @@ def test_joint_limits_are_those_of_the_package() -> None:
     for _ in range(12):
         free = random_machine(random, {})
         _, _, poses = reachable_pose(random, free)
-        limited = Machine(free.parameters, {}, LIMITS, free.octant, free.elbows)
+        limited = Machine(free.mechanism, free.parameters, {}, LIMITS, free.mode)
         built = mechanism_kind("uru").build(free.parameters, LIMITS)
-        mode = built.mode_of({"octant": free.octant, "elbows": free.elbows})
+        mode = built.mode_of(free.mode)
         machines = limited.exactly(free.parameters)
         for pose in poses[:10]:
             reach = float(built.margins(pose, mode)["reach"][0])
@@ -399,7 +397,7 @@ def test_a_matrix_is_positive_definite_throughout_a_cube_exactly_when_it_is_at_t
 
 SIZES = {"db": 0.185804, "dp": 0.06, "f": 0.232357, "r": 0.176357, "k": 1.0}
 NOMINAL = {name: (value, value, value) for name, value in SIZES.items()}
-MADE = Machine(NOMINAL, {"db": 1e-4, "f": 1e-4, "r": 1e-4}, {}, "+++", "+++")
+MADE = uru(NOMINAL, {"db": 1e-4, "f": 1e-4, "r": 1e-4}, {}, "+++", "+++")
 """Made so precisely, it has two singular values that are equal where x = y = z."""
 
 

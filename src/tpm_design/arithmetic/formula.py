@@ -48,6 +48,8 @@ def formula(stub: Callable[..., Any], geometry_class: type) -> Callable[[Impleme
     The implementation has the stub's parameters, the geometry first. It is returned unchanged.
     """
     _implemented.setdefault(stub, set()).add(geometry_class)
+    if stub.__module__.startswith("tpm_design."):
+        keep_apart(geometry_class.__module__)
     return _registered(stub, lambda given: given is geometry_class)
 
 
@@ -62,8 +64,6 @@ def _registered(
     stub: Callable[..., Any], serves: Callable[[type | None], bool]
 ) -> Callable[[Implementation], Implementation]:
     parameters = list(inspect.signature(stub).parameters)
-    if stub.__module__.startswith("tpm_design."):
-        keep_apart(geometry_class.__module__)
 
     def register(implementation: Implementation) -> Implementation:
         if list(inspect.signature(implementation).parameters) != parameters:

@@ -6,29 +6,35 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from tpm_design.checker.claims import PARAMETERS, Machine, Requirement
+from tpm_design.checker.claims import ANY, Machine, Requirement
 from tpm_design.checker.fields import Fields
+from tpm_design.checker.mechanisms import Mechanism
+from tpm_design.checker.mechanisms.configuration import LIMBS
+from tpm_design.checker.mechanisms.mechanism import LENGTH, Parameter, Powers
 from tpm_design.checker.regions import Region
-from tpm_design.checker.uru import LIMBS
 
 METRES = {"mm": (1, 1000), "cm": (1, 100), "m": (1, 1), "in": (127, 5000)}
 CENTRE = ("center_x", "center_y", "center_z")
 
-POWERS: Mapping[str, tuple[int, int]] = {
+POWERS: Mapping[str, Powers] = {
     "reachable_volume": (3, 0),
     "singularity_free_volume": (3, 0),
-    "translation_singularity_distance": (1, 0),
-    "actuation_singularity_distance": (1, 0),
-    "rotation_singularity_distance": (1, 0),
-    "boundary_distance": (1, 0),
-    "link_clearance": (1, 0),
-    "total_link_length": (1, 0),
-    "robot_size": (1, 0),
-    "velocity_min": (1, -1),
-    "velocity_max": (1, -1),
-    "actuator_range": (0, 1),
+    "translation_singularity_distance": LENGTH,
+    "actuation_singularity_distance": LENGTH,
+    "rotation_singularity_distance": LENGTH,
+    "boundary_distance": LENGTH,
+    "link_clearance": LENGTH,
+    "total_link_length": LENGTH,
+    "robot_size": LENGTH,
 }
-"""Powers of metre and radian in a metric of the 3-URU; the others are plain numbers."""
+
+
+def powers_of(metric: str, mechanism: Mechanism) -> Powers:
+    """Powers of metre and radian in a metric; those that are named nowhere are plain numbers."""
+    metre, radian = mechanism.actuator
+    if metric in ("velocity_min", "velocity_max"):
+        return 1 - metre, -radian
+    return mechanism.actuator if metric == "actuator_range" else POWERS.get(metric, (0, 0))
 
 
 class StudyUnits:
@@ -64,14 +70,10 @@ def disagreements(
     yield from _limits(study.fields("mechanism"), units, machine)
     yield from _tolerances(study, units, machine)
     yield from _region(study, units, design, region, machine)
-    yield from _requirements(study, units, requirements)
+    yield from _requirements(study, units, requirements, machine.mechanism)
 
 
-def _dimension(name: str) -> tuple[int, int]:
-    return (0, 0) if name.startswith("k") else (1, 0)
-
-
-def _allowed(given: Fields, key: str, value: float, units: StudyUnits, powers: tuple[int, int]) -> bool:
+def _allowed(given: Fields, key: str, value: float, units: StudyUnits, powers: Powers) -> bool:
     """Whether a design's value is the study's, within its range or one of its list."""
     if not isinstance(given.value(key), dict):
         return same(value, units.si(given.number(key), *powers))
@@ -84,51 +86,78 @@ def _allowed(given: Fields, key: str, value: float, units: StudyUnits, powers: t
 
 
 def _parameters(mechanism: Fields, units: StudyUnits, design: Fields, machine: Machine) -> Iterator[str]:
-    mechanism.text("type", ("uru",))
+    mechanism.text("type", (machine.mechanism.name,))
     given = mechanism.fields("parameters")
-    for name, values in machine.parameters.items():
-        single = [f"{name}{limb + 1}" for limb in LIMBS]
-        names = [name] * 3 if name in given.data else single
-        for key, value in zip(names, values, strict=True):
-            if design.number(key) != value:
-                yield f"machine.parameters.{name} is not the design's {key}"
-            tie = given.value(key)
-            if isinstance(tie, dict) and "equals" in tie:
-                source = given.fields(key).text("equals")
-                if design.number(source) != value:
-                    yield f"the design's {key} is not its {source}"
-            elif not _allowed(given, key, value, units, _dimension(name)):
-                yield f"the design's {key} is not within what the study gives"
-    known = {*PARAMETERS, *(f"{name}{limb + 1}" for name in PARAMETERS for limb in LIMBS)}
+    known: set[str] = set()
+    left_out: set[str] = set()
+    for parameter in machine.mechanism.parameters:
+        names = {parameter.name, *parameter.limb_names}
+        known |= names
+        if parameter.name not in given.data:
+            left_out |= names if parameter.default is not None else set()
+        for limb in LIMBS:
+            yield from _size(parameter, limb, given, units, design, machine)
     yield from (f"the study has a parameter {name}" for name in given.data if name not in known)
-    odd = set(design.data) - set(given.data) - set(CENTRE) - {"mode"}
+    odd = set(design.data) - set(given.data) - left_out - set(CENTRE) - {"mode"}
     yield from (f"the design has a quantity {name} that the study has not" for name in sorted(odd))
 
 
+def _size(
+    parameter: Parameter, limb: int, given: Fields, units: StudyUnits, design: Fields, machine: Machine
+) -> Iterator[str]:
+    """One limb's value: the design's, which the study allows, or the default of a study that is silent."""
+    value, single = machine.parameters[parameter.name][limb], parameter.limb_names[limb]
+    silent = parameter.default is not None and not {parameter.name, single} & set(given.data)
+    places = design if silent else given
+    key = parameter.name if parameter.name in places.data else single
+    if not (silent and key not in design.data) and design.number(key) != value:
+        yield f"machine.parameters.{parameter.name} is not the design's {key}"
+    if silent and parameter.default is not None:
+        if not same(value, parameter.default[limb]):
+            yield f"machine.parameters.{parameter.name} is not what it is where the study does not give it"
+        return
+    tie = given.value(key)
+    if isinstance(tie, dict) and "equals" in tie:
+        source = given.fields(key).text("equals")
+        if design.number(source) != value:
+            yield f"the design's {key} is not its {source}"
+    elif not _allowed(given, key, value, units, parameter.powers):
+        yield f"the design's {key} is not within what the study gives"
+
+
 def _mode(mechanism: Fields, design: Fields, machine: Machine) -> Iterator[str]:
-    if design.text("mode") != f"{machine.octant} {machine.elbows}":
+    if design.text("mode") != " ".join(machine.mode.values()):
         yield "mode is not the design's"
     if mechanism.value("mode") == "best":
-        if machine.octant == "any":
-            yield "mode has no octant, as no mode of the study's has"
+        yield from (
+            f"mode has no {field}, as no mode of the study's has"
+            for field, signs in machine.mode.items()
+            if signs == ANY
+        )
         return
     mode = mechanism.fields("mode")
-    if (mode.data.get("octant", "any"), mode.text("elbows")) != (machine.octant, machine.elbows):
+    if any(mode.data.get(field, ANY) != signs for field, signs in machine.mode.items()):
         yield "mode is not the study's"
 
 
 def _limits(mechanism: Fields, units: StudyUnits, machine: Machine) -> Iterator[str]:
     given = mechanism.fields("limits")
-    if set(given.data) != set(machine.limits):
+    limits = machine.mechanism.limits
+    switches = {name for name, limit in limits.items() if limit.form == "switch"}
+    for name in switches:
+        if given.data.get(name, True) is not machine.limits.get(name, True):
+            yield f"machine.limits.{name} is not the study's"
+    if set(given.data) - switches != set(machine.limits) - switches:
         yield "machine.limits are not those the study sets"
         return
-    for name, limit in machine.limits.items():
+    for name in set(machine.limits) - switches:
+        limit, powers = machine.limits[name], limits[name].powers
         if isinstance(limit, tuple):
             ends = given.fields(name)
-            asked = [units.si(ends.number(end), 0, 1) for end in ("min", "max")]
+            asked = [units.si(ends.number(end), *powers) for end in ("min", "max")]
             if not all(same(value, other) for value, other in zip(limit, asked, strict=True)):
                 yield f"machine.limits.{name} is not the study's"
-        elif not same(limit, units.length(given.number(name))):
+        elif not same(limit, units.si(given.number(name), *powers)):
             yield f"machine.limits.{name} is not the study's"
 
 
@@ -141,9 +170,10 @@ def _tolerances(study: Fields, units: StudyUnits, machine: Machine) -> Iterator[
     if set(given.data) != set(machine.tolerance):
         yield "tolerance is not of the parameters the study names"
         return
-    for name, value in machine.tolerance.items():
-        if not same(value, units.si(given.number(name), *_dimension(name))):
-            yield f"the tolerance of {name} is not the study's"
+    for parameter in machine.mechanism.parameters:
+        for name in {parameter.name, *parameter.limb_names} & set(machine.tolerance):
+            if not same(machine.tolerance[name], units.si(given.number(name), *parameter.powers)):
+                yield f"the tolerance of {name} is not the study's"
 
 
 def _region(
@@ -198,13 +228,16 @@ def _centre(
         return
     axes = given.fields("center")
     mirrored = axes.data.get("mirrored") is True
-    for axis, sign, value in zip("xyz", machine.octant, centre, strict=True):
-        turned = -value if mirrored and sign == "-" else value
-        if not _allowed(axes, axis, turned, units, (1, 0)):
+    sides = machine.within_tolerance().setting.sides
+    for axis, side, value in zip("xyz", sides, centre, strict=True):
+        turned = -value if mirrored and side < 0 else value
+        if not _allowed(axes, axis, turned, units, LENGTH):
             yield f"the design's center_{axis} is not within what the study gives"
 
 
-def _requirements(study: Fields, units: StudyUnits, requirements: list[Requirement]) -> Iterator[str]:
+def _requirements(
+    study: Fields, units: StudyUnits, requirements: list[Requirement], mechanism: Mechanism
+) -> Iterator[str]:
     asked = study.entries("constraints")
     if len(asked) != len(requirements):
         yield f"there are {len(requirements)} requirements, and {len(asked)} constraints in the study"
@@ -215,7 +248,7 @@ def _requirements(study: Fields, units: StudyUnits, requirements: list[Requireme
         if (entry.text("label"), metric) != (label, requirement.metric):
             yield f"the requirement {label} is not the study's constraint in its place"
             continue
-        powers = POWERS.get(metric, (0, 0))
+        powers = powers_of(metric, mechanism)
         for key, bound in (("min", requirement.least), ("max", requirement.greatest)):
             written = entry.number_or_none(key)
             converted = None if written is None else units.si(written, *powers)

@@ -167,6 +167,17 @@ def dot(u: Sequence[Enclosure], v: Sequence[Enclosure]) -> Enclosure:
     return chained(value, terms)
 
 
+def combination(factors: Sequence[arb], parts: Sequence[Enclosure]) -> Enclosure:
+    """Σ of numbers without derivatives times quantities."""
+    value = ZERO
+    terms = []
+    for factor, part in zip(factors, parts, strict=True):
+        if not factor.is_zero():
+            value = value + factor * part.value
+            terms.append((factor, part))
+    return chained(value, terms)
+
+
 def norm_squared(u: Sequence[Enclosure]) -> Enclosure:
     value = ZERO
     terms = []

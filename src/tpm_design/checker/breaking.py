@@ -6,20 +6,20 @@ from collections.abc import Sequence
 
 from flint import arb
 
-from tpm_design.checker.claims import PARAMETERS, Machine, Requirement
-from tpm_design.checker.proof import Machines, natural, spans_of, sum_of_links
+from tpm_design.checker.claims import Machine, Requirement
+from tpm_design.checker.mechanisms import Mechanism
+from tpm_design.checker.mechanisms.configuration import LIMBS, Configuration, Machines
+from tpm_design.checker.proof import natural, spans_of, sum_of_links
 from tpm_design.checker.regions import Domain, Point, Region
-from tpm_design.checker.requirements import DRIVEN, rule_of
+from tpm_design.checker.requirements import DISTANCE, rule_of
 from tpm_design.checker.spectrum import Vector, singular_pairs
 from tpm_design.checker.statements import (
-    DETERMINANTS,
     Frobenius,
     Goal,
     Serial,
     Transmission,
     outside_goals,
 )
-from tpm_design.checker.uru import LIMBS, Configuration
 
 ROUNDING = 1e-12
 """What a pose on the surface of a region, a size at the end of its tolerance and a determinant on its locus
@@ -31,20 +31,21 @@ def not_broken(requirement: Requirement, machine: Machine, region: Region | None
     breaking = requirement.breaking
     if breaking is None:
         return "nothing that breaks it is given"
-    tolerances = machine.tolerances()
-    for name in PARAMETERS:
+    mechanism, tolerances = machine.mechanism, machine.tolerances()
+    for name, nominals in machine.parameters.items():
         for value, nominal, tolerance in zip(
-            breaking.parameters[name], machine.parameters[name], tolerances[name], strict=True
+            breaking.parameters[name], nominals, tolerances[name], strict=True
         ):
             if not abs(value - nominal) <= tolerance + ROUNDING * max(abs(nominal), tolerance):
                 return f"the machine that breaks it has a {name} outside its tolerance"
     machines = machine.exactly(breaking.parameters)
     if requirement.metric == "total_link_length":
-        return None if _length_broken(requirement, machines) else "the links are as long as is asked"
+        broken = _length_broken(requirement, machines, mechanism.links)
+        return None if broken else "the links are as long as is asked"
     pose = breaking.pose
     if pose is None:
         return "no pose that breaks it is given"
-    rule = rule_of(requirement)
+    rule = rule_of(requirement, mechanism)
     bound = None if rule is None else requirement.least if rule.bound == "min" else requirement.greatest
     if region is None or bound is None:
         return "no pose alone can break it"
@@ -54,8 +55,10 @@ def not_broken(requirement: Requirement, machine: Machine, region: Region | None
     inside = _within(region, pose, 0.0)
     if inside and _unreachable(at, pose):
         return None
-    if requirement.metric.endswith("_singularity_distance"):
-        name = requirement.metric.removesuffix("_singularity_distance")
+    if requirement.metric.endswith(DISTANCE):
+        name = requirement.metric.removesuffix(DISTANCE)
+        if name not in mechanism.determinants:
+            return f"{mechanism.name} has no {name} singularity, and the pose that breaks it is in reach"
         if not _within(region, pose, bound):
             return "the pose that breaks it is not within the distance of the region"
         if _out_of_reach(at, pose):
@@ -64,15 +67,17 @@ def not_broken(requirement: Requirement, machine: Machine, region: Region | None
         return None if crossed else "the determinant has the region's sign at the pose that breaks it"
     if not inside:
         return "the pose that breaks it is not in the region"
-    if _crossed(at, machines, region, _sides(requirement)) or _short(requirement, bound, at):
+    if _crossed(at, machines, region, _sides(requirement, mechanism)) or _short(
+        requirement, mechanism, bound, at
+    ):
         return None
     return "the pose that is said to break it meets it"
 
 
-def _length_broken(requirement: Requirement, machines: Machines) -> bool:
+def _length_broken(requirement: Requirement, machines: Machines, links: Sequence[str]) -> bool:
     least, greatest = requirement.least, requirement.greatest
-    return (least is not None and sum_of_links(machines, False) < least) or (
-        greatest is not None and sum_of_links(machines, True) > greatest
+    return (least is not None and sum_of_links(machines, links, False) < least) or (
+        greatest is not None and sum_of_links(machines, links, True) > greatest
     )
 
 
@@ -87,7 +92,7 @@ def _within(region: Region, pose: Point, distance: float) -> bool:
 
 
 def _wrong_side(at: Configuration, pose: Point, slack: float) -> bool:
-    return any(side * value < -slack for side, value in zip(at.mode.octant, pose, strict=True))
+    return any(side * value < -slack for side, value in zip(at.setting.sides, pose, strict=True))
 
 
 def _unreachable(at: Configuration, pose: Point) -> bool:
@@ -100,11 +105,11 @@ def _out_of_reach(at: Configuration, pose: Point) -> bool:
     return _wrong_side(at, pose, ROUNDING) or any(goal(at).value > ROUNDING for goal in outside_goals(at))
 
 
-def _sides(requirement: Requirement) -> Sequence[str]:
+def _sides(requirement: Requirement, mechanism: Mechanism) -> Sequence[str]:
     if requirement.metric in ("coverage", "singularity_margin_min"):
-        return DETERMINANTS
+        return mechanism.determinants
     if requirement.metric in ("conditioning_min", "velocity_max", "position_sensitivity"):
-        return (DRIVEN[str(requirement.options["drive"])],)
+        return (mechanism.drives[str(requirement.options["drive"])],)
     return ()
 
 
@@ -118,15 +123,15 @@ def _crossed(at: Configuration, machines: Machines, region: Region, names: Seque
     return False
 
 
-def _short(requirement: Requirement, bound: float, at: Configuration) -> bool:
+def _short(requirement: Requirement, mechanism: Mechanism, bound: float, at: Configuration) -> bool:
     """Whether the metric's value at one pose is proved to be on the wrong side of the bound."""
     metric = requirement.metric
     drive = str(requirement.options.get("drive", ""))
     if metric == "boundary_distance":
-        return any((at.leg_margins(limb)[end].value < bound) for limb in LIMBS for end in (0, 1))
+        return any(at.margin(which).value < bound for which in at.setting.reach)
     if metric == "singularity_margin_min":
         missed = _missed(Serial(bound).goals(at).quantities, at)
-        return missed or any(abs(at.unit_determinant(name).value) < bound for name in DETERMINANTS)
+        return missed or any(abs(at.unit_determinant(name).value) < bound for name in mechanism.determinants)
     if metric == "transmission_min":
         return _missed(Transmission(bound).goals(at).quantities, at)
     if metric == "conditioning_min" and requirement.options["norm"] == "frobenius":

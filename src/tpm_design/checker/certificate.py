@@ -90,8 +90,11 @@ class _Check:
         if certificate.text("study_sha256") != canonical_sha256(certificate.fields("study").data):
             self.faults.append("study_sha256 is not that of the study")
         machine, region = read_machine(certificate), read_region(certificate)
-        claims = [read_claim(entry) for entry in certificate.entries("statements")]
-        requirements = [read_requirement(entry, len(claims)) for entry in certificate.entries("requirements")]
+        mechanism = machine.mechanism
+        claims = [read_claim(entry, mechanism) for entry in certificate.entries("statements")]
+        requirements = [
+            read_requirement(entry, len(claims), mechanism) for entry in certificate.entries("requirements")
+        ]
         outcome = certificate.text("outcome", OUTCOMES)
         self._assumptions(certificate)
         self.faults += disagreements(certificate, machine, region, requirements)
@@ -209,11 +212,11 @@ def _size(cover: Cover, whole: bool) -> int:
 
 
 def _length_fault(statement: Length, machine: Machine) -> str | None:
-    machines = machine.within_tolerance()
+    machines, links = machine.within_tolerance(), machine.mechanism.links
     floor, ceiling = statement.floor, statement.ceiling
-    if floor is not None and not sum_of_links(machines, False) >= floor:
+    if floor is not None and not sum_of_links(machines, links, False) >= floor:
         return "the links may be shorter"
-    if ceiling is not None and not sum_of_links(machines, True) <= ceiling:
+    if ceiling is not None and not sum_of_links(machines, links, True) <= ceiling:
         return "the links may be longer"
     return None
 
@@ -224,7 +227,8 @@ def _requirement_faults(
     named = [claims[index] for index in requirement.statements]
     all_proved = all(claim.outcome == "proved" for claim in named)
     separate = region is not None and len(region.parts) > 1
-    lacking = unproved(requirement, [c.statement for c in named if c.outcome == "proved"], separate)
+    proved = [claim.statement for claim in named if claim.outcome == "proved"]
+    lacking = unproved(requirement, machine.mechanism, proved, separate)
     if requirement.outcome == "proved":
         if lacking is not None:
             yield lacking

@@ -8,10 +8,11 @@ from typing import Any
 
 from tpm_design.checker.cover import Cover
 from tpm_design.checker.fields import Fields
-from tpm_design.checker.proof import Machines, Span, sizes_within
+from tpm_design.checker.mechanisms import MECHANISMS, Mechanism
+from tpm_design.checker.mechanisms.configuration import Machines
+from tpm_design.checker.mechanisms.mechanism import ANGLE, LimitValue, Made, ModeField
 from tpm_design.checker.regions import Point, Region
 from tpm_design.checker.statements import (
-    DETERMINANTS,
     Condition,
     Determinant,
     Fastest,
@@ -25,12 +26,17 @@ from tpm_design.checker.statements import (
     Statement,
     Transmission,
 )
-from tpm_design.checker.uru import JOINTS, LIMBS, Mode, joint_range
+from tpm_design.errors import UsageError
 
-PARAMETERS = ("db", "dp", "f", "r", "k")
 OUTCOMES = ("proved", "refuted", "undecided")
-DRIVES = ("motor", "joint")
 SIGNS = {"+": 1, "-": -1}
+ANY = "any"
+DOMAINS = {
+    "positive": "greater than 0",
+    "non-negative": "0 or more",
+    "non-zero": "different from 0",
+    "any": "a number",
+}
 
 Parameters = Mapping[str, tuple[float, float, float]]
 
@@ -69,93 +75,103 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Machine:
-    """Sizes per limb, their tolerances, limits and the working mode, as written."""
+    """A mechanism's sizes per limb, their tolerances, limits and the working mode, as written."""
 
+    mechanism: Mechanism
     parameters: Parameters
     tolerance: Mapping[str, float]
-    limits: Mapping[str, tuple[float, float] | float]
-    octant: str
-    elbows: str
+    limits: Mapping[str, LimitValue]
+    mode: Mapping[str, str]
 
     def within_tolerance(self) -> Machines:
         return self._machines(self.parameters, self.tolerances())
 
     def exactly(self, parameters: Parameters) -> Machines:
-        return self._machines(parameters, dict.fromkeys(PARAMETERS, (0.0, 0.0, 0.0)))
+        return self._machines(parameters, dict.fromkeys(parameters, (0.0, 0.0, 0.0)))
 
     def tolerances(self) -> Parameters:
         """± of each size of each limb."""
         found = {}
-        for name in PARAMETERS:
-            one, two, three = (
-                self.tolerance.get(name, self.tolerance.get(f"{name}{limb + 1}", 0.0)) for limb in LIMBS
-            )
-            found[name] = (one, two, three)
+        for parameter in self.mechanism.parameters:
+            whole = self.tolerance.get(parameter.name, 0.0)
+            one, two, three = (self.tolerance.get(name, whole) for name in parameter.limb_names)
+            found[parameter.name] = (one, two, three)
         return found
 
     def _machines(self, parameters: Parameters, tolerances: Parameters) -> Machines:
-        ranges = [
-            joint_range(joint, *limit)
-            for joint in JOINTS
-            if isinstance(limit := self.limits.get(joint), tuple)
-        ]
-        octant = "000" if self.octant == "any" else self.octant
-        x, y, z = (SIGNS.get(sign, 0) for sign in octant)
-        s1, s2, s3 = (SIGNS[sign] for sign in self.elbows)
-        sizes: dict[str, Span] = {}
-        for limb in LIMBS:
-            sizes |= sizes_within(
-                limb,
-                {name: parameters[name][limb] for name in PARAMETERS},
-                {name: tolerances[name][limb] for name in PARAMETERS},
-            )
-        return Machines(Mode((x, y, z), (s1, s2, s3)), tuple(r for r in ranges if r is not None), sizes)
+        signs = {field: _three_signs(text) for field, text in self.mode.items()}
+        return self.mechanism.machines(Made(parameters, tolerances, self.limits, signs))
 
 
-def read_parameters(fields: Fields) -> Parameters:
-    found = {name: fields.triple(name) for name in PARAMETERS}
-    for name, values in found.items():
-        if name in ("f", "r") and min(values) <= 0.0:
-            fields.refuse(name, "greater than 0")
-        if name == "k" and 0.0 in values:
-            fields.refuse(name, "different from 0")
+def _three_signs(text: str) -> tuple[int, int, int]:
+    one, two, three = (SIGNS.get(sign, 0) for sign in (text if text != ANY else "000"))
+    return one, two, three
+
+
+def read_mechanism(certificate: Fields) -> Mechanism:
+    """Raises UsageError for a mechanism whose equations are not written here."""
+    name = certificate.fields("machine").text("type")
+    if "file" in certificate.fields("study").fields("mechanism").data:
+        told = f"the mechanism {name} is from a file of its own, which the checker does not know"
+    elif name not in MECHANISMS:
+        told = f"the mechanism {name} is not known to the checker"
+    else:
+        return MECHANISMS[name]
+    raise UsageError(
+        f"{told}: its certificate cannot be proved again",
+        where=certificate.file,
+        remedy=f"Certificates of {', '.join(MECHANISMS)} can be checked.",
+    )
+
+
+def read_parameters(fields: Fields, mechanism: Mechanism) -> Parameters:
+    found = {}
+    for parameter in mechanism.parameters:
+        found[parameter.name] = values = fields.triple(parameter.name)
+        if not all(map(parameter.allows, values)):
+            fields.refuse(parameter.name, DOMAINS[parameter.domain])
     return found
 
 
 def read_machine(certificate: Fields) -> Machine:
+    mechanism = read_mechanism(certificate)
     machine, mode = certificate.fields("machine"), certificate.fields("mode")
-    machine.text("type", ("uru",))
-    limits: dict[str, tuple[float, float] | float] = {}
-    given = machine.fields("limits")
-    for name in given.data:
-        if name in JOINTS:
-            low, high = given.numbers(name, 2)
-            limits[name] = (low, high)
-        elif name == "link_radius":
-            limits[name] = given.number(name)
-        else:
-            given.refuse(name, "a limit of the 3-URU")
     tolerance = certificate.fields("tolerance")
-    names = {*PARAMETERS, *(f"{name}{limb + 1}" for name in PARAMETERS for limb in LIMBS)}
-    for name in tolerance.data:
-        if name not in names or tolerance.number(name) < 0.0:
-            tolerance.refuse(name, "a tolerance of a parameter, 0 or more")
-    for name in PARAMETERS:
-        if name in tolerance.data and any(f"{name}{limb + 1}" in tolerance.data for limb in LIMBS):
-            tolerance.refuse(name, "given once, for all limbs or for each")
     return Machine(
-        read_parameters(machine.fields("parameters")),
-        {name: tolerance.number(name) for name in tolerance.data},
-        limits,
-        _signs(mode, "octant", "any"),
-        _signs(mode, "elbows"),
+        mechanism,
+        read_parameters(machine.fields("parameters"), mechanism),
+        _tolerance(tolerance, mechanism),
+        {name: _limit(machine.fields("limits"), name, mechanism) for name in machine.fields("limits").data},
+        {field.name: _signs(mode, field) for field in mechanism.mode},
     )
 
 
-def _signs(mode: Fields, key: str, word: str = "") -> str:
-    text = mode.text(key)
-    if text != word and (len(text) != 3 or set(text) - set(SIGNS)):
-        mode.refuse(key, "three signs")
+def _limit(given: Fields, name: str, mechanism: Mechanism) -> LimitValue:
+    limit = mechanism.limits.get(name)
+    if limit is None:
+        given.refuse(name, f"a limit of {mechanism.name}")
+    if limit.form == "range":
+        low, high = given.numbers(name, 2)
+        return low, high
+    return given.switch(name) if limit.form == "switch" else given.number(name)
+
+
+def _tolerance(given: Fields, mechanism: Mechanism) -> dict[str, float]:
+    sizes = [parameter for parameter in mechanism.parameters if parameter.powers != ANGLE]
+    names = {name for parameter in sizes for name in (parameter.name, *parameter.limb_names)}
+    for name in given.data:
+        if name not in names or given.number(name) < 0.0:
+            given.refuse(name, "a tolerance of a length or ratio, 0 or more")
+    for parameter in sizes:
+        if parameter.name in given.data and any(name in given.data for name in parameter.limb_names):
+            given.refuse(parameter.name, "given once, for all limbs or for each")
+    return {name: given.number(name) for name in given.data}
+
+
+def _signs(mode: Fields, field: ModeField) -> str:
+    text = mode.text(field.name)
+    if not (field.any_allowed and text == ANY) and (len(text) != 3 or set(text) - set(SIGNS)):
+        mode.refuse(field.name, "three signs")
     return text
 
 
@@ -175,13 +191,13 @@ def read_region(certificate: Fields) -> Region | None:
     return Region(form, region.triple("centre"), half)
 
 
-def read_claim(entry: Fields) -> Claim:
+def read_claim(entry: Fields, mechanism: Mechanism) -> Claim:
     kind = entry.text("kind", tuple(KINDS))
     covers = []
     for cover in entry.entries("covers") if kind != "length" else ():
         x, y, z = cover.intervals("root")
         covers.append(Cover((x, y, z), cover.text("tree")))
-    return Claim(KINDS[kind](entry), entry.text("outcome", OUTCOMES), tuple(covers))
+    return Claim(KINDS[kind](entry, mechanism), entry.text("outcome", OUTCOMES), tuple(covers))
 
 
 def _level(entry: Fields, key: str) -> float:
@@ -197,33 +213,37 @@ def _positive(entry: Fields, key: str) -> float:
     return value
 
 
-def _drive(entry: Fields) -> str:
-    return entry.text("drive", DRIVES)
+def _drive(entry: Fields, mechanism: Mechanism) -> str:
+    return entry.text("drive", tuple(mechanism.drives))
 
 
-def _determinant(entry: Fields) -> Determinant:
+def _determinant(entry: Fields, mechanism: Mechanism) -> Determinant:
     sign = entry.number("sign")
     if abs(sign) != 1.0:
         entry.refuse("sign", "1 or -1")
-    return Determinant(entry.text("name", DETERMINANTS), int(sign), _positive(entry, "floor"))
+    return Determinant(entry.text("name", mechanism.determinants), int(sign), _positive(entry, "floor"))
 
 
-KINDS: Mapping[str, Callable[[Fields], Statement | Length]] = {
-    "reach": lambda entry: Reach(_level(entry, "floor")),
+KINDS: Mapping[str, Callable[[Fields, Mechanism], Statement | Length]] = {
+    "reach": lambda entry, _: Reach(_level(entry, "floor")),
     "determinant": _determinant,
-    "serial": lambda entry: Serial(_level(entry, "floor")),
-    "frobenius": lambda entry: Frobenius(_drive(entry), _level(entry, "floor")),
-    "condition": lambda entry: Condition(_drive(entry), _level(entry, "floor")),
-    "slowest": lambda entry: Slowest(_drive(entry), _level(entry, "floor")),
-    "fastest": lambda entry: Fastest(_drive(entry), _positive(entry, "ceiling")),
-    "transmission": lambda entry: Transmission(_level(entry, "floor")),
-    "sensitivity": lambda entry: Sensitivity(_drive(entry), _positive(entry, "ceiling")),
-    "locus": lambda entry: Locus(entry.text("name", DETERMINANTS), _level(entry, "distance")),
-    "length": lambda entry: Length(entry.number_or_none("floor"), entry.number_or_none("ceiling")),
+    "serial": lambda entry, _: Serial(_level(entry, "floor")),
+    "frobenius": lambda entry, mechanism: Frobenius(_drive(entry, mechanism), _level(entry, "floor")),
+    "condition": lambda entry, mechanism: Condition(_drive(entry, mechanism), _level(entry, "floor")),
+    "slowest": lambda entry, mechanism: Slowest(_drive(entry, mechanism), _level(entry, "floor")),
+    "fastest": lambda entry, mechanism: Fastest(_drive(entry, mechanism), _positive(entry, "ceiling")),
+    "transmission": lambda entry, _: Transmission(_level(entry, "floor")),
+    "sensitivity": lambda entry, mechanism: Sensitivity(
+        _drive(entry, mechanism), _positive(entry, "ceiling")
+    ),
+    "locus": lambda entry, mechanism: Locus(
+        entry.text("name", mechanism.determinants), _level(entry, "distance")
+    ),
+    "length": lambda entry, _: Length(entry.number_or_none("floor"), entry.number_or_none("ceiling")),
 }
 
 
-def read_requirement(entry: Fields, statements: int) -> Requirement:
+def read_requirement(entry: Fields, statements: int, mechanism: Mechanism) -> Requirement:
     indices = entry.items("statements")
     if not all(type(index) is int and 0 <= index < statements for index in indices):
         entry.refuse("statements", "a list of statements' places")
@@ -231,7 +251,7 @@ def read_requirement(entry: Fields, statements: int) -> Requirement:
     if entry.value("breaking") is not None:
         given = entry.fields("breaking")
         pose = None if given.value("pose") is None else given.triple("pose")
-        breaking = Breaking(pose, read_parameters(given.fields("parameters")))
+        breaking = Breaking(pose, read_parameters(given.fields("parameters"), mechanism))
     return Requirement(
         entry.text("label"),
         entry.text("metric"),

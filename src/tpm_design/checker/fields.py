@@ -44,6 +44,10 @@ class Fields:
         value = self.data.get(key)
         return None if value is None else self._number(value, key)
 
+    def switch(self, key: str) -> bool:
+        value = self.value(key)
+        return value if isinstance(value, bool) else self.refuse(key, "true or false")
+
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
         return self._numbers(self.value(key), key, count)
 

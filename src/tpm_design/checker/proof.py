@@ -2,60 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 from flint import arb
 
 from tpm_design.checker.balls import ZERO, Enclosure, Symmetric, full
 from tpm_design.checker.definite import congruent, positive_definite_throughout
+from tpm_design.checker.mechanisms.configuration import AXES, LIMBS, Configuration, Machines, Span
 from tpm_design.checker.regions import Box, Domain
 from tpm_design.checker.spectrum import unit_frame
 from tpm_design.checker.statements import Goal, Locus, Reach, Statement, outside_goals
-from tpm_design.checker.uru import AXES, LIMBS, Configuration, JointRange, Mode
 
 ONE = arb(1)
 BISECTIONS = 15
 """How often a leaf whose bounds are too loose may be halved, one half of one half after the other."""
 
 
-class Span:
-    """All the values of one variable: a ball around them, their ends, middle and half width."""
-
-    __slots__ = ("centre", "high", "low", "radius", "whole")
-
-    def __init__(self, low: arb, high: arb) -> None:
-        self.low, self.high = low, high
-        self.whole = low.union(high)
-        self.centre = self.whole.mid()
-        self.radius = (self.whole - self.centre).abs_upper()
-
-
 Spans = Mapping[str, Span]
-
-
-@dataclass(frozen=True)
-class Machines:
-    """Every machine within the tolerance: the spans of its sizes, ``delta1`` … ``k3``."""
-
-    mode: Mode
-    limits: tuple[JointRange, ...]
-    sizes: Mapping[str, Span]
 
 
 def natural(machines: Machines, spans: Spans) -> Configuration:
     variables = {name: Enclosure(span.whole, {}) for name, span in spans.items()}
-    return Configuration(machines.mode, machines.limits, variables)
+    return machines.at(variables)
 
 
 def graded(machines: Machines, spans: Spans) -> tuple[Configuration, Configuration]:
     """With derivatives in everything that varies, and the configuration in the middle."""
     centre = {name: Enclosure(span.centre, {}) for name, span in spans.items()}
-    middle = Configuration(machines.mode, machines.limits, centre)
+    middle = machines.at(centre)
     variables = {
         name: Enclosure(span.whole, {name: ONE} if span.radius > 0 else {}) for name, span in spans.items()
     }
-    return Configuration(machines.mode, machines.limits, variables, middle), middle
+    return machines.at(variables, middle), middle
 
 
 def positive(goal: Goal, slopes: Configuration, machines: Machines, spans: Spans) -> bool:
@@ -78,7 +56,7 @@ def positive(goal: Goal, slopes: Configuration, machines: Machines, spans: Spans
         else:
             loss += slope.abs_upper() * span.radius
     variables = {name: Enclosure(value, {}) for name, value in point.items()}
-    return bool(goal(Configuration(machines.mode, machines.limits, variables)).value - loss > 0)
+    return bool(goal(machines.at(variables)).value - loss > 0)
 
 
 def definite(over: Symmetric, centre: Symmetric, spans: Spans) -> bool:
@@ -118,7 +96,7 @@ def all_positive(statement: Statement, machines: Machines, spans: Spans) -> bool
 
 def out_of_reach(machines: Machines, box: Box, spans: Spans) -> bool:
     """Whether one margin of reach or of the mode is < 0 on the whole box for every machine."""
-    for (low, high), side in zip(box, machines.mode.octant, strict=True):
+    for (low, high), side in zip(box, machines.setting.sides, strict=True):
         if (side > 0 and high < 0.0) or (side < 0 and low > 0.0):
             return True
     slopes, middle = graded(machines, spans)
@@ -127,10 +105,11 @@ def out_of_reach(machines: Machines, box: Box, spans: Spans) -> bool:
     return any(positive(goal, slopes, machines, spans) for goal in goals)
 
 
-def in_octant(mode: Mode, box: Box) -> bool:
+def on_its_sides(machines: Machines, box: Box) -> bool:
+    """Whether a box is on the mode's side of each coordinate plane."""
     return all(
         side == 0 or (low >= 0.0 if side > 0 else high <= 0.0)
-        for (low, high), side in zip(box, mode.octant, strict=True)
+        for (low, high), side in zip(box, machines.setting.sides, strict=True)
     )
 
 
@@ -144,7 +123,7 @@ def spans_of(machines: Machines, box: Box) -> dict[str, Span]:
 def settled(statement: Statement, machines: Machines, domain: Domain, box: Box) -> bool:
     """Whether a box needs no further look: the statement holds on it, or it says nothing about it."""
     spans = spans_of(machines, box)
-    if isinstance(statement, Reach) and not in_octant(machines.mode, box):
+    if isinstance(statement, Reach) and not on_its_sides(machines, box):
         return domain.outside(box)
     if all_positive(statement, machines, spans) or domain.outside(box):
         return True
@@ -188,22 +167,11 @@ def never_reached(machines: Machines, box: Box) -> bool:
     return True
 
 
-def sum_of_links(machines: Machines, largest: bool) -> arb:
-    """Greatest or least total link length of the machines."""
+def sum_of_links(machines: Machines, links: Sequence[str], largest: bool) -> arb:
+    """Greatest or least total link length of the machines, ``links`` by the names of their lengths."""
     total = arb(0)
-    for size in ("f", "r"):
+    for size in links:
         for limb in LIMBS:
             span = machines.sizes[f"{size}{limb + 1}"]
             total += span.high if largest else span.low
     return total
-
-
-def sizes_within(limb: int, nominal: Mapping[str, float], tolerance: Mapping[str, float]) -> dict[str, Span]:
-    """A limb's sizes from its parameters db, dp, f, r, k, each ± its tolerance, exactly enclosed."""
-    ends = {
-        name: (arb(value) - arb(tolerance[name]), arb(value) + arb(tolerance[name]))
-        for name, value in nominal.items()
-    }
-    (base_low, base_high), (platform_low, platform_high) = ends["db"], ends["dp"]
-    found = {f"{name}{limb + 1}": Span(*ends[name]) for name in ("f", "r", "k")}
-    return found | {f"delta{limb + 1}": Span(platform_low - base_high, platform_high - base_low)}

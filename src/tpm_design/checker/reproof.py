@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 from tpm_design.checker.claims import Machine
 from tpm_design.checker.cover import Cover, Letter, leaves
-from tpm_design.checker.proof import Machines, never_reached, proved
+from tpm_design.checker.mechanisms.configuration import Machines
+from tpm_design.checker.proof import never_reached, proved
 from tpm_design.checker.regions import Box, Domain
 from tpm_design.checker.statements import Locus, Statement
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from tpm_design.checker.claims import Requirement
+from tpm_design.checker.mechanisms import Mechanism
 from tpm_design.checker.statements import (
-    DETERMINANTS,
     Condition,
     Determinant,
     Fastest,
@@ -24,7 +24,7 @@ from tpm_design.checker.statements import (
 )
 
 Stated = Statement | Length
-DRIVEN = {"motor": "actuation", "joint": "translation"}
+SINGULARITIES = ("translation", "actuation", "rotation")
 
 
 class Need(NamedTuple):
@@ -68,67 +68,80 @@ def at_most(kind: type[Fastest | Sensitivity], ceiling: float, drive: str) -> Ne
     )
 
 
-def _conditioning(least: float, options: Mapping[str, Any]) -> list[Need]:
-    drive = str(options["drive"])
-    kind = Frobenius if options["norm"] == "frobenius" else Condition
-    return [reach(0.0), side(DRIVEN[drive]), at_least(kind, least, drive)]
+def rules(mechanism: Mechanism) -> dict[str, Rule]:
+    """How each metric is proved for a mechanism."""
+
+    def drive(given: Mapping[str, Any]) -> str:
+        return str(given["drive"])
+
+    def guarded(given: Mapping[str, Any]) -> Need:
+        return side(mechanism.drives[drive(given)])
+
+    def conditioning(least: float, given: Mapping[str, Any]) -> list[Need]:
+        kind = Frobenius if given["norm"] == "frobenius" else Condition
+        return [reach(0.0), guarded(given), at_least(kind, least, drive(given))]
+
+    def sides(floor: float = 0.0) -> list[Need]:
+        return [side(name, floor) for name in mechanism.determinants]
+
+    either = {"drive": tuple(mechanism.drives)}
+    return {
+        "coverage": Rule("min", lambda least, _: [reach(0.0), *sides()]),
+        "conditioning_min": Rule(
+            "min", conditioning, {"norm": ("2", "frobenius"), "over": ("region",), **either}
+        ),
+        **{
+            f"{name}{DISTANCE}": _singularity_distance(name, name in mechanism.determinants)
+            for name in SINGULARITIES
+        },
+        "boundary_distance": Rule("min", lambda least, _: [reach(max(0.0, least))]),
+        "singularity_margin_min": Rule(
+            "min", lambda least, _: [reach(0.0), at_least(Serial, least), *sides(least)]
+        ),
+        "velocity_min": Rule(
+            "min", lambda least, given: [reach(0.0), at_least(Slowest, least, drive(given))], either
+        ),
+        "velocity_max": Rule(
+            "max",
+            lambda most, given: [reach(0.0), guarded(given), at_most(Fastest, most, drive(given))],
+            either,
+        ),
+        "transmission_min": Rule(
+            "min",
+            lambda least, _: [reach(0.0), at_least(Transmission, least)],
+            {"drive": (mechanism.transmission_drive,)},
+        ),
+        "position_sensitivity": Rule(
+            "max",
+            lambda most, given: [reach(0.0), guarded(given), at_most(Sensitivity, most, drive(given))],
+            either,
+        ),
+    }
 
 
-def _singularity_distance(name: str) -> Rule:
+DISTANCE = "_singularity_distance"
+
+
+def _singularity_distance(name: str, has_it: bool) -> Rule:
+    """Without such a singularity what is in reach is as far from it as is asked."""
+
     def needs(least: float, _: Mapping[str, Any]) -> list[Need]:
         far = Need(
             f"locus {name} with distance {least}",
             lambda s: isinstance(s, Locus) and s.name == name and s.distance >= least,
         )
-        return [reach(0.0), far]
+        return [reach(0.0), far] if has_it else [reach(0.0)]
 
     return Rule("min", needs)
 
 
-DRIVE = {"drive": ("motor", "joint")}
-RULES: Mapping[str, Rule] = {
-    "coverage": Rule("min", lambda least, _: [reach(0.0), *(side(name) for name in DETERMINANTS)]),
-    "conditioning_min": Rule(
-        "min", _conditioning, {"norm": ("2", "frobenius"), "over": ("region",), **DRIVE}
-    ),
-    **{f"{name}_singularity_distance": _singularity_distance(name) for name in DETERMINANTS},
-    "boundary_distance": Rule("min", lambda least, _: [reach(max(0.0, least))]),
-    "singularity_margin_min": Rule(
-        "min",
-        lambda least, _: [reach(0.0), at_least(Serial, least), *(side(name, least) for name in DETERMINANTS)],
-    ),
-    "velocity_min": Rule(
-        "min", lambda least, given: [reach(0.0), at_least(Slowest, least, given["drive"])], DRIVE
-    ),
-    "velocity_max": Rule(
-        "max",
-        lambda most, given: [
-            reach(0.0),
-            side(DRIVEN[given["drive"]]),
-            at_most(Fastest, most, given["drive"]),
-        ],
-        DRIVE,
-    ),
-    "transmission_min": Rule(
-        "min", lambda least, _: [reach(0.0), at_least(Transmission, least)], {"drive": ("joint",)}
-    ),
-    "position_sensitivity": Rule(
-        "max",
-        lambda most, given: [
-            reach(0.0),
-            side(DRIVEN[given["drive"]]),
-            at_most(Sensitivity, most, given["drive"]),
-        ],
-        DRIVE,
-    ),
-}
-
-
-def unproved(requirement: Requirement, proved: Sequence[Stated], separate_poses: bool) -> str | None:
+def unproved(
+    requirement: Requirement, mechanism: Mechanism, proved: Sequence[Stated], separate_poses: bool
+) -> str | None:
     """What a requirement still lacks to be proved by statements; None where they suffice."""
     if requirement.metric == "total_link_length":
         return _length_unproved(requirement, proved)
-    rule = rule_of(requirement)
+    rule = rule_of(requirement, mechanism)
     if rule is None:
         return "no statement of this format proves it"
     bound = requirement.least if rule.bound == "min" else requirement.greatest
@@ -145,9 +158,9 @@ def unproved(requirement: Requirement, proved: Sequence[Stated], separate_poses:
     return None
 
 
-def rule_of(requirement: Requirement) -> Rule | None:
+def rule_of(requirement: Requirement, mechanism: Mechanism) -> Rule | None:
     """The rule for a requirement's metric with its options."""
-    rule = RULES.get(requirement.metric)
+    rule = rules(mechanism).get(requirement.metric)
     if rule is None or set(rule.options) != set(requirement.options):
         return None
     allowed = all(requirement.options[name] in choices for name, choices in rule.options.items())
@@ -165,12 +178,13 @@ def _length_unproved(requirement: Requirement, proved: Sequence[Stated]) -> str 
 
 
 def proved_slack(requirement: Requirement, last: Stated) -> float:
-    """By how much the last statement of a requirement exceeds what is asked for. Coverage is flat: there it
-    is the statement's own floor."""
+    """By how much the last statement of a requirement exceeds what is asked for. Coverage is flat, and a
+    singularity that is nowhere has no distance: there it is the statement's own floor."""
     found = []
     if requirement.least is not None:
         value = last.distance if isinstance(last, Locus) else getattr(last, "floor", None)
-        asked = 0.0 if requirement.metric == "coverage" else requirement.least
+        nowhere = requirement.metric.endswith(DISTANCE) and not isinstance(last, Locus)
+        asked = 0.0 if requirement.metric == "coverage" or nowhere else requirement.least
         found += [] if value is None else [value - asked]
     if requirement.greatest is not None:
         value = getattr(last, "ceiling", None)

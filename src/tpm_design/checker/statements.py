@@ -24,8 +24,8 @@ from tpm_design.checker.balls import (
     norm_squared,
     square,
 )
+from tpm_design.checker.mechanisms.configuration import LIMBS, Configuration, Velocity
 from tpm_design.checker.spectrum import singular_pairs
-from tpm_design.checker.uru import LIMBS, Configuration, Velocity
 
 Goal = Callable[[Configuration], Enclosure]
 SymmetricGoals = Callable[[Configuration], Sequence[Symmetric]]
@@ -38,7 +38,6 @@ class Goals(NamedTuple):
     matrices: SymmetricGoals | None = None
 
 
-DETERMINANTS = ("translation", "actuation", "rotation")
 NINE = arb(9)
 NEARLY_EQUAL = 1.02
 """Ratio of squared singular values."""
@@ -46,42 +45,32 @@ NEARLY_EQUAL = 1.02
 
 @dataclass(frozen=True)
 class Reach:
-    """Every leg margin ≥ floor (m), on the octant's side of each plane, joints within their ranges."""
+    """Every margin of reach ≥ floor (m), on the mode's side of each coordinate plane, joints within their
+    limits."""
 
     floor: float
 
     def goals(self, configuration: Configuration) -> Goals:
         margin = constant(arb(self.floor))
-        legs: list[Goal] = [
-            lambda at, limb=limb, side=side: at.leg_margins(limb)[side] - margin  # type: ignore[misc]
-            for limb in LIMBS
-            for side in (0, 1)
+        setting = configuration.setting
+        reach: list[Goal] = [
+            lambda at, which=which: at.margin(which) - margin  # type: ignore[misc]
+            for which in setting.reach
         ]
-        return Goals([*legs, *limit_goals(configuration)])
-
-
-def limit_goals(configuration: Configuration) -> list[Goal]:
-    """Joints within their ranges."""
-    return [
-        lambda at, limb=limb, limit=limit: at.limit_margin(limb, limit)  # type: ignore[misc]
-        for limb in LIMBS
-        for limit in configuration.limits
-    ]
+        within: list[Goal] = [
+            lambda at, which=which: at.margin(which)  # type: ignore[misc]
+            for which in setting.within
+        ]
+        return Goals(reach + within)
 
 
 def outside_goals(configuration: Configuration) -> list[Goal]:
     """Each of them > 0 alone puts a pose out of reach."""
-    legs: list[Goal] = [
-        lambda at, limb=limb, side=side: -at.leg_margins(limb)[side]  # type: ignore[misc]
-        for limb in LIMBS
-        for side in (0, 1)
+    setting = configuration.setting
+    return [
+        lambda at, which=which: -at.margin(which)  # type: ignore[misc]
+        for which in (*setting.reach, *setting.within)
     ]
-    limits: list[Goal] = [
-        lambda at, limb=limb, limit=limit: -at.limit_margin(limb, limit)  # type: ignore[misc]
-        for limb in LIMBS
-        for limit in configuration.limits
-    ]
-    return legs + limits
 
 
 @dataclass(frozen=True)
@@ -99,7 +88,7 @@ class Determinant:
 
 @dataclass(frozen=True)
 class Serial:
-    """|sin θ_i3| ≥ floor for each limb."""
+    """The distance of each limb from its own singularity ≥ floor."""
 
     floor: float
 
@@ -107,7 +96,7 @@ class Serial:
         least = constant(arb(self.floor) ** 2)
         return Goals(
             [
-                lambda at, limb=limb: at.elbow_sine_squared(limb) - least  # type: ignore[misc]
+                lambda at, limb=limb: at.serial_squared(limb) - least  # type: ignore[misc]
                 for limb in LIMBS
             ]
         )
@@ -271,20 +260,29 @@ def add_slopes(total: dict[str, float], entry: Enclosure, factor: float) -> None
 
 @dataclass(frozen=True)
 class Transmission:
-    """λ_i = |sin θ_i3| ≥ floor and η_i = |det V|/|v_j × v_k| ≥ floor."""
+    """λ_i = |a_i·t_i| ≥ floor and η_i = |det A|/|a_j × a_k| ≥ floor, for unit rows a_i and the unit velocity
+    t_i of the driven point."""
 
     floor: float
 
-    def goals(self, configuration: Configuration) -> Goals:
+    def goals(self, _: Configuration) -> Goals:
         least = arb(self.floor) ** 2
 
+        def input_(at: Configuration, limb: int) -> Enclosure:
+            return at.input_transmission_squared(limb) - constant(least)
+
         def output(at: Configuration, limb: int) -> Enclosure:
-            rows = at.velocity("joint").rows
+            rows = at.velocity(at.transmission_drive).rows
             across = norm_squared(cross(rows[(limb + 1) % 3], rows[(limb + 2) % 3]))
             return square(determinant(rows)) - across.times(least)
 
-        outputs: list[Goal] = [lambda at, limb=limb: output(at, limb) for limb in LIMBS]  # type: ignore[misc]
-        return Goals([*Serial(self.floor).goals(configuration).quantities, *outputs])
+        return Goals(
+            [
+                lambda at, limb=limb, index=index: index(at, limb)  # type: ignore[misc]
+                for index in (input_, output)
+                for limb in LIMBS
+            ]
+        )
 
 
 @dataclass(frozen=True)
@@ -325,7 +323,7 @@ class Locus:
 
 @dataclass(frozen=True)
 class Length:
-    """Total link length Σ f_i + r_i between ``floor`` and ``ceiling`` (m), where given."""
+    """Total link length between ``floor`` and ``ceiling`` (m), where given."""
 
     floor: float | None
     ceiling: float | None
