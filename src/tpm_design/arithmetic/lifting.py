@@ -61,6 +61,25 @@ def _overload_seeded(values: Any, like: Any) -> Any:
     return written("seeded", "values, like", f"({', '.join(duals)},)", globals())
 
 
+POSE_COORDINATES = 3
+
+
+def roomy_variables(values: Any) -> Any:
+    """``variables(values)`` with room for a pose's coordinates: at least three derivatives, the last ones 0.
+    In compiled code."""
+    raise NotImplementedError
+
+
+@overload(roomy_variables, jit_options=STRICT, strict=False)
+def _overload_roomy_variables(values: Any) -> Any:
+    slots = range(max(POSE_COORDINATES, values.count))
+    duals = [
+        f"Dual(values[{i}], ({', '.join(f'same_kind({float(i == j)}, values[0])' for j in slots)},))"
+        for i in range(values.count)
+    ]
+    return written("roomy_variables", "values", f"({', '.join(duals)},)", globals())
+
+
 @register_jitable(**STRICT)
 def replaced(triple: Any, position: int, value: Any) -> Any:
     """The triple with ``value`` at one position, the others lifted to its kind."""

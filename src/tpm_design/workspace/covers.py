@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from tpm_design.arithmetic import Interval, formula, inner, kernel, variables
 from tpm_design.arithmetic.interval import up
-from tpm_design.arithmetic.lifting import lifted, seeded
+from tpm_design.arithmetic.lifting import lifted, roomy_variables, seeded
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace import statements
@@ -142,7 +142,7 @@ def _the_worst_machine(tolerances, geometry, limb_slopes, number):  # type: igno
 @inner
 def _limb_slopes(statement, geometry, mode, guide, limb, x, y, z):  # type: ignore[no-untyped-def]
     """Derivatives of the slacks by one limb's parameters."""
-    values = variables(equations.limb_parameters(geometry, limb))
+    values = roomy_variables(equations.limb_parameters(geometry, limb))
     moved = equations.with_limb_parameters(geometry, limb, values)
     like = values[0]
     return statements.slacks(statement, moved, mode, guide, lifted(x, like), lifted(y, like), lifted(z, like))
@@ -151,7 +151,7 @@ def _limb_slopes(statement, geometry, mode, guide, limb, x, y, z):  # type: igno
 @inner
 def _pose_slopes(statement, geometry, mode, guide, x, y, z):  # type: ignore[no-untyped-def]
     """Derivatives of the slacks by the pose, in the type that ``_limb_slopes`` has: compiled once."""
-    values = variables(equations.limb_parameters(geometry, 0))
+    values = roomy_variables(equations.limb_parameters(geometry, 0))
     like = values[0]
     constants = values
     for q in range(len(values)):
