@@ -35,7 +35,7 @@ mechanism:
   parameters: {o: 0, h: {min: 90, max: 300}, k: 2}
 region: {type: box, size: [200, 200, 200], center: [0, 0, 0]}
 objectives: [{metric: total_link_length, sense: minimize}]
-constraints: [{metric: total_link_length, label: long, min: 600}]
+constraints: [{metric: total_link_length, label: long, min: 300}]
 optimizer: {method: nlopt.cobyla, budget: 30, seed: 1}
 """
 NEEDS_ASKING = (
@@ -174,12 +174,12 @@ def test_python_asks_too(tmp_path: Path) -> None:
 
 
 def test_a_search_finds_the_shortest_strokes(run_folder: Path) -> None:
-    """Three strokes of at least 600 mm together, each twice h."""
+    """Three half strokes of at least 300 mm together."""
     best = json.loads((run_folder / "run.json").read_text(encoding="utf-8"))["best_id"]
     rows = (run_folder / "evaluations.jsonl").read_text(encoding="utf-8").splitlines()
     found = json.loads(rows[best])
     assert found["design"]["h"] == pytest.approx(0.1, rel=1e-6)
-    assert found["metrics"]["total_link_length"] == pytest.approx(0.6, rel=1e-6)
+    assert found["metrics"]["total_link_length"] == pytest.approx(0.3, rel=1e-6)
 
 
 def test_a_run_folder_stands_alone(run_folder: Path) -> None:

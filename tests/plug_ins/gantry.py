@@ -11,13 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tpm_design.arithmetic import Interval, formula, magnitude
+from tpm_design.arithmetic import formula, magnitude
 from tpm_design.arithmetic.lifting import replaced
 from tpm_design.mechanisms import equations
+from tpm_design.mechanisms.angles import NEXT_AXIS
 from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import MechanismKind, Parameter, Singularity
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
-from tpm_design.mechanisms.parameters import limb_tolerances, limb_values, three_numbers
+from tpm_design.mechanisms.parameters import enclosed_values, limb_values, three_numbers
 
 SCALE = 1.0
 
@@ -28,12 +29,7 @@ class GantryGeometry(NamedTuple):
     middle: tuple[float, ...]
     half: tuple[float, ...]
     ratio: tuple[float, ...]
-
-
-class GantrySigns(NamedTuple):
-    """There is one working mode."""
-
-    only: float
+    link_radius: float = 0.0
 
 
 @formula(equations.leg_margins, GantryGeometry)
@@ -48,20 +44,10 @@ def _mode_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     return (0.0 * x + 1.0,)
 
 
-@formula(equations.singularity_margins, GantryGeometry)
-def _singularity_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    return (0.0 * x + 1.0,)
-
-
 @formula(equations.serial_margins, GantryGeometry)
 def _serial_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     one = 0.0 * x + 1.0
     return one, one, one
-
-
-@formula(equations.input_transmission, GantryGeometry)
-def _input_transmission(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    return equations.serial_margins(geometry, mode, x, y, z)
 
 
 @formula(equations.length_error_gains, GantryGeometry)
@@ -69,30 +55,23 @@ def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def
     return equations.serial_margins(geometry, mode, x, y, z)
 
 
-@formula(equations.limb_clearance, GantryGeometry)
-def _limb_clearance(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    return 0.0 * x + 1.0
-
-
 @formula(equations.joint_centres, GantryGeometry)
 def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     nil = 0.0 * x
-    return ((x, nil, nil),), ((nil, y, nil),), ((nil, nil, z),)
-
-
-@formula(equations.velocity_map, GantryGeometry)
-def _velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
-    nil, one = 0.0 * x, 0.0 * x + 1.0
-    k1, k2, k3 = geometry.ratio
-    entries = (SCALE * k1 * one, SCALE * k2 * one, SCALE * k3 * one)
-    return ((one, nil, nil), (nil, one, nil), (nil, nil, one)), entries
+    o1, o2, o3 = geometry.middle
+    return (
+        ((nil + o1, nil, nil), (x, nil, nil)),
+        ((x, nil + o2, nil), (x, y, nil)),
+        ((x, y, nil + o3), (x, y, z)),
+    )
 
 
 @formula(equations.unit_velocity_map, GantryGeometry)
 def _unit_velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
-    rows, entries = equations.velocity_map(geometry, mode, motor, x, y, z)
-    one = 0.0 * x + 1.0
-    return rows, entries, (one, one, one)
+    nil, one = 0.0 * x, 0.0 * x + 1.0
+    k1, k2, k3 = geometry.ratio
+    entries = (SCALE * k1 * one, SCALE * k2 * one, SCALE * k3 * one)
+    return ((one, nil, nil), (nil, one, nil), (nil, nil, one)), entries, (one, one, one)
 
 
 @formula(equations.actuators, GantryGeometry)
@@ -113,6 +92,7 @@ def _with_limb_parameters(geometry, limb, values):  # type: ignore[no-untyped-de
         replaced(geometry.middle, limb, values[0]),
         replaced(geometry.half, limb, values[1]),
         replaced(geometry.ratio, limb, values[2]),
+        geometry.link_radius,
     )
 
 
@@ -122,29 +102,12 @@ class Gantry(Mechanism):
 
     geometry: GantryGeometry
 
-    def mode_of(self, signs: Mapping[str, str]) -> Mode:
-        return Mode("only", GantrySigns(1.0))
-
     def reach_radius(self) -> float:
         return float(np.linalg.norm(np.abs(self.geometry.middle) + np.array(self.geometry.half)))
 
     def enclosed_geometry(self, tolerance: Mapping[str, float]) -> Any:
-        bounds = limb_tolerances(self.kind, tolerance)
-
-        def held(name: str) -> Any:
-            around = bounds.get(name, (0.0, 0.0, 0.0))
-            values = self.parameters[name]
-            return tuple(value + Interval(-bound, bound) for value, bound in zip(values, around, strict=True))
-
-        return GantryGeometry(held("o"), held("h"), held("k"))
-
-    def total_link_length(self) -> float:
-        return 2.0 * sum(self.geometry.half)
-
-    def enclosed_link_length(self, tolerance: Mapping[str, float]) -> Interval:
-        h1, h2, h3 = self.enclosed_geometry(tolerance).half
-        total: Interval = 2.0 * (h1 + h2 + h3)
-        return total
+        held = enclosed_values(self.kind, self.parameters, tolerance)
+        return self.geometry._replace(middle=held["o"], half=held["h"], ratio=held["k"])
 
     def assemblies(self, q: Any, mode: Mode | None = None, *, drive: str = "motor") -> tuple[Assembly, ...]:
         self.motor_weight(drive)
@@ -171,7 +134,7 @@ KIND = MechanismKind(
     source="own derivation",
     parameters=(
         Parameter("o", "o_i", "length", "any", "middle of the stroke of the slide"),
-        Parameter("h", "h_i", "length", "positive", "half the stroke of the slide"),
+        Parameter("h", "h_i", "length", "positive", "half the stroke of the slide", moving_link=True),
         Parameter("k", "k_i", "ratio", "positive", "travel of the slide by travel of the drive"),
     ),
     pose=("x", "y", "z"),
@@ -180,8 +143,9 @@ KIND = MechanismKind(
     mode_fields=(),
     limits=(),
     determinants=("actuation",),
-    singularities=(Singularity("actuation", "none: the axes are at right angles", "x_i = o_i + k_i q_i"),),
+    singularities=(Singularity("actuation", "none: the axes are at right angles", "det = 1"),),
     example={"o": 0.0, "h": 0.2, "k": 1.0},
     build=build,
     farthest_reach=farthest_reach,
+    limb_rotation=NEXT_AXIS,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,12 +29,18 @@ class Mode:
     signs: Any
 
 
+class OnlyMode(NamedTuple):
+    """The signs of a mechanism that has one working mode."""
+
+    only: float = 1.0
+
+
 @dataclass(frozen=True)
 class Mechanism(ABC):
     """One machine. ``parameters``: name → SI value per limb; ``geometry``: the same for the kernels.
     ``signs_class``: named tuple of the signs of a mode, its fields named as those of the mode."""
 
-    signs_class: ClassVar[type[Any]]
+    signs_class: ClassVar[type[Any]] = OnlyMode
 
     kind: MechanismKind
     parameters: Mapping[str, tuple[float, ...]]
@@ -44,7 +50,7 @@ class Mechanism(ABC):
         """The working mode named by sign strings, e.g. ``{"octant": "+++", "elbows": "+-+"}``. Raises
         ParameterError on anything but one sign string for each field."""
         values = mode_signs(self.kind, signs)
-        label = " ".join(signs[field.name] for field in self.kind.mode_fields)
+        label = " ".join(signs[field.name] for field in self.kind.mode_fields) or "only"
         return Mode(label, self.signs_class(**values))
 
     def single_octants(self, mode: Mode) -> tuple[Mode, ...]:

@@ -32,6 +32,7 @@ MEMBERS: Mapping[str, type] = {
     "limits": Limit,
     "determinants": str,
     "singularities": Singularity,
+    "pose_units": str,
 }
 """Fields of a ``MechanismKind`` that are tuples, and what is in them."""
 COMPILING = "Failed in nopython mode pipeline"
