@@ -98,12 +98,18 @@ def list_(
 @guarded
 def show(
     name: Annotated[str, typer.Argument(help="A mechanism, metric, optimizer or region.")],
+    drawing: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write a labelled line drawing of a mechanism: FILE.svg or FILE.png."
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> int | None:
     """Explain one of them: parameters, units, options, source of its equations."""
     from tpm_design.cli.catalogue import show_thing
 
-    return show_thing(name, as_json=as_json)
+    return show_thing(name, drawing, as_json=as_json)
 
 
 @app.command()
