@@ -79,7 +79,8 @@ class Drawing:
 
     ``marks``: a parameter's name, or a symbol such as ``q_i`` → where it is written on limb 1: at a point
     ``("A",)``, along a length ``("A", "C")``, or in an angle ``("OA", "A", "C")``, its vertex in the middle.
-    Points are joints, ``O`` the origin and ``P`` the platform's point. Directions are ``+x`` … ``-z``,
+    Points are joints, ``O`` the origin, and of the platform ``P``, its position, or ``M``, the middle of its
+    joints, where poses are not positions. Directions are ``+x`` … ``-z``,
     ``+rail`` and ``OA``, from O to A; a length along a direction is as long as its parameter.
 
     ``pose``: where the example is drawn; None: at a pose well inside the workspace.

@@ -13,7 +13,7 @@ from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.report.marks import Angle, AtPoint, Mark, marks
 from tpm_design.report.placing import beside_line, beside_point
 from tpm_design.report.sheet import CENTRE_LINE, LETTER, Sheet
-from tpm_design.report.skeleton import AXES, ORIGIN, PLATFORM, FloatArray, Skeleton, skeleton
+from tpm_design.report.skeleton import AXES, ORIGIN, FloatArray, Skeleton, skeleton
 from tpm_design.report.style import ASPECT_FILL, BLUE, GREY, INK, PALE, VERMILLION
 from tpm_design.report.symbols import equation, mathematics
 from tpm_design.report.viewpoint import Viewpoint, best_viewpoint
@@ -150,7 +150,9 @@ def _draw_rods(scene: _Scene, limb: int, start: FloatArray, end: FloatArray) -> 
     """The parallelogram between two joints."""
     colour, width = (INK, 2.0) if limb == 0 else (LIGHT, 1.6)
     layer = LINK_LAYER + scene.depth(0.5 * (start + end))
-    aside = ROD_SPREAD * scene.body.size * scene.body.hinges[limb]
+    lever = float(np.linalg.norm(scene.body.limbs[limb, -1] - scene.body.platform))
+    spread = min(ROD_SPREAD * scene.body.size, max(0.4 * lever, 0.3 * ROD_SPREAD * scene.body.size))
+    aside = spread * scene.body.hinges[limb]
     for side in (aside, -aside):
         scene.sheet.line(scene.at([start + side, end + side]), colour, width, layer, halo=True)
     for bar in (start, end):
@@ -201,16 +203,19 @@ def _mark_words(body: Skeleton, mark: Mark, units: Units | None) -> str:
 def _draw_names(scene: _Scene) -> None:
     """The points O and P, then the joints, those of limb 1 first."""
     body, sheet = scene.body, scene.sheet
-    for name, point in ((ORIGIN, np.zeros(3)), (PLATFORM, body.platform)):
+    for name, point in ((ORIGIN, np.zeros(3)), (body.platform_name, body.platform)):
         words, at = f"${name}$", scene.at(point)
         sheet.spot(at, "o", SPOT, INK, INK, POINT_LAYER)
         sheet.words(words, INK, beside_point(at, sheet.half(words), SPOT))
     for limb in range(len(body.limbs)):
         colour, size = (INK, LETTER) if limb == 0 else (GREY, LETTER - 2.0)
         for letter in body.letters():
+            shared = body.shared(letter)
+            if shared and limb > 0:
+                continue
             at_joint = body.point(letter, limb)
-            if at_joint is not None:
-                words = f"${letter}_{{{limb + 1}}}$"
+            if at_joint is not None and not body.is_point(at_joint, letter):
+                words = f"${letter}_{{{'i' if shared else limb + 1}}}$"
                 places = beside_point(scene.at(at_joint), sheet.half(words, size), 6.0)
                 sheet.words(words, colour, places, size)
 

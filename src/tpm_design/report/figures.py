@@ -64,7 +64,7 @@ def _drawings(context: Context, units: Units) -> list[Picture]:
     """The machine in the middle of its useful region; where it cannot be there, well inside its workspace."""
     machine, mode = context.mechanism, context.mode
     places = {"well inside its workspace": good_pose(machine, mode)}
-    if context.region is not None:
+    if context.region is not None and machine.kind.translational:
         places = {"in the middle of the useful region": context.region.centre, **places}
     for where, pose in places.items():
         figure = None if pose is None else mechanism_figure(machine, mode, pose, units)

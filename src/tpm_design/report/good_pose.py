@@ -16,9 +16,10 @@ def first_mode(mechanism: Mechanism) -> Mode:
 
 def good_pose(mechanism: Mechanism, mode: Mode) -> tuple[float, ...] | None:
     """The pose of a lattice that is farthest inside reach and from all singularities, each as a share of
-    what is best there; None where no pose of it is reachable, or poses are not positions."""
+    what is best there. Where poses are not positions, the one that the mechanism declares for its drawing.
+    None where there is none, or none is reachable."""
     if not mechanism.kind.translational:
-        return None
+        return mechanism.kind.drawing.pose
     radius = mechanism.reach_radius()
     side = np.linspace(-radius, radius, LATTICE)
     # off the planes that a symmetric mechanism is singular on

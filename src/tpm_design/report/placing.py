@@ -18,13 +18,13 @@ SIDEWAYS = (0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74)
 
 @dataclass(frozen=True)
 class Label:
-    """A rectangle of words about its centre, and how much it costs to be there."""
+    """A rectangle of words about its centre."""
 
     centre: tuple[float, float]
     half: tuple[float, float]
 
     def overlap(self, other: Label) -> float:
-        """Common area as a share of this one."""
+        """Common area as a share of the smaller one."""
         width, height = (
             max(
                 0.0,
@@ -33,7 +33,8 @@ class Label:
             )
             for k in (0, 1)
         )
-        return width * height / (4.0 * self.half[0] * self.half[1])
+        smaller = min(label.half[0] * label.half[1] for label in (self, other))
+        return width * height / (4.0 * smaller)
 
     def covered(self, points: FloatArray) -> int:
         """How many of the points (n, 2) lie inside."""

@@ -22,7 +22,7 @@ POINTS_PER_INCH = 72.0
 LETTER = 13.0
 HALO = 3.0
 SHORTEST_WITH_ARROWS = 22.0
-DIMENSION_DISTANCES = (13.0, 20.0, 28.0, 37.0)
+DIMENSION_DISTANCES = (13.0, 20.0, 28.0, 37.0, 47.0)
 SERIF = "stix"
 
 Dash = Literal["solid"] | tuple[float, tuple[float, ...]]

@@ -19,7 +19,7 @@ AXES: Mapping[str, tuple[float, float, float]] = {
     "y": (0.0, 1.0, 0.0),
     "z": (0.0, 0.0, 1.0),
 }
-ORIGIN, PLATFORM = "O", "P"
+ORIGIN, PLATFORM, MIDDLE = "O", "P", "M"
 RAIL = "+rail"
 STEP = 1e-4
 RAIL_PIECE = 0.17
@@ -49,6 +49,11 @@ class Skeleton:
     @property
     def drawing(self) -> Drawing:
         return self.mechanism.kind.drawing
+
+    @property
+    def platform_name(self) -> str:
+        """The pose is a position and the point P, or ``platform`` is the middle of the platform's joints."""
+        return PLATFORM if self.mechanism.kind.translational else MIDDLE
 
     @property
     def bases(self) -> FloatArray:
@@ -105,7 +110,7 @@ class Skeleton:
             return np.asarray(self.limbs[limb, place])
         if name == ORIGIN:
             return np.zeros(3)
-        if name == PLATFORM:
+        if name == self.platform_name:
             return self.platform
         if self.rails and name == self.drawing.slides_from:
             return self.rails[limb].start
@@ -116,6 +121,17 @@ class Skeleton:
         joints = self.drawing.joints
         own = self.drawing.slides_from
         return (own, *joints) if self.rails and own not in (*joints, ORIGIN) else joints
+
+    def shared(self, letter: str) -> bool:
+        """Whether a joint of all limbs has one place, so that it has one name, ``B_i``."""
+        place = self.joint(letter)
+        if place is None:
+            return False
+        return bool(np.ptp(self.limbs[:, place], axis=0).max() < 1e-3 * self.size)
+
+    def is_point(self, point: FloatArray, letter: str) -> bool:
+        """Whether a rail that starts with ``letter`` does so at the origin, which has a name already."""
+        return letter not in self.drawing.joints and bool(np.linalg.norm(point) < 1e-6 * self.size)
 
     def direction(self, name: str, limb: int) -> FloatArray | None:
         """The unit vector that a mark names; None where it names none or it has no direction."""
