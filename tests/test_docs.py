@@ -12,13 +12,16 @@ import typer
 
 import tpm_design as tpm
 from tpm_design.cli.app import app
+from tpm_design.cli.catalogue import show_thing
 from tpm_design.mechanisms import MECHANISMS
 from tpm_design.metrics import METRICS
 from tpm_design.optimizers import OPTIMIZERS
+from tpm_design.report.escape import text
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+MECHANISM_PAGES = sorted((ROOT / "docs" / "mechanisms").glob("*.md"))
 CODE = re.compile(r"```[a-z]*\n(.*?)```|`([^`\n]+)`", re.DOTALL)
 COMMAND = re.compile(r"(?<![\w-])tpm-design ([a-z]+)([^\n&]*)")
 OPTION = re.compile(r"--[a-z-]+")
@@ -61,10 +64,64 @@ def test_the_table_of_commands_is_complete() -> None:
     assert table == options()
 
 
-@pytest.mark.parametrize("page", [*PAGES, ROOT / "results" / "README.md"], ids=lambda path: str(path.name))
+@pytest.mark.parametrize(
+    "page",
+    [*PAGES, ROOT / "results" / "README.md", *MECHANISM_PAGES],
+    ids=lambda path: f"{path.parent.name}/{path.name}",
+)
 def test_links_lead_somewhere(page: Path) -> None:
     for target in LINK.findall(page.read_text(encoding="utf-8")):
         assert target.startswith("https://") or (page.parent / target).exists(), target
+
+
+@pytest.fixture(scope="module")
+def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What `docs/generate.py` writes now, README.md with the table included."""
+    folder = tmp_path_factory.mktemp("generated")
+    text = re.sub(r"(?<=<!-- mechanisms -->\n\n).*?(?=\n<!-- end)", "", README, flags=re.DOTALL)
+    assert text != README
+    (folder / "README.md").write_text(text, encoding="utf-8")
+    subprocess.run([sys.executable, ROOT / "docs" / "generate.py", folder], check=True)
+    return folder
+
+
+def test_the_pages_and_the_table_of_mechanisms_are_what_the_program_knows(generated: Path) -> None:
+    assert (generated / "README.md").read_text(encoding="utf-8") == README
+    names = ["README.md", *(f"{name}{suffix}" for name in MECHANISMS for suffix in (".md", ".svg"))]
+    for folder in (generated, ROOT):
+        assert sorted(path.name for path in (folder / "docs" / "mechanisms").iterdir()) == sorted(names)
+    for page in MECHANISM_PAGES:
+        now = (generated / "docs" / "mechanisms" / page.name).read_text(encoding="utf-8")
+        assert page.read_text(encoding="utf-8") == now, f"{page.name}: run `python docs/generate.py`"
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_the_drawing_in_the_docs_holds_every_word_that_is_drawn_now(name: str, generated: Path) -> None:
+    """Outlines of letters may change with the library that draws them, words do not."""
+    kept, now = (
+        re.findall("<!-- (.*?) -->", (folder / "docs/mechanisms" / f"{name}.svg").read_text(encoding="utf-8"))
+        for folder in (ROOT, generated)
+    )
+    assert "$A_{1}$" in now
+    assert kept == now, f"{name}.svg: run `python docs/generate.py`"
+
+
+def test_the_page_of_a_mechanism_says_all_that_it_declares(capsys: pytest.CaptureFixture[str]) -> None:
+    for kind in MECHANISMS.values():
+        page = (ROOT / "docs" / "mechanisms" / f"{kind.name}.md").read_text(encoding="utf-8")
+        show_thing(kind.name, None, as_json=False)
+        shown = capsys.readouterr().out
+        names = [p.name for p in kind.parameters] + [f.name for f in kind.mode_fields]
+        names += [x.name for x in kind.limits] + [s.name for s in kind.singularities]
+        for name in names:
+            assert f"| `{name}` |" in page
+            assert re.search(rf"^{name} ", shown, re.MULTILINE)
+        for words in (kind.source, *(s.equation for s in kind.singularities), *kind.remarks):
+            assert words in shown
+            assert text(words) in page
+        row = next(line for line in README.splitlines() if f"docs/mechanisms/{kind.name}.md" in line)
+        for words in (kind.title, *kind.pose, *(s.name for s in kind.singularities)):
+            assert text(words) in row
 
 
 def test_the_main_command_is_one_line_that_runs_a_valid_study() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import struct
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from tpm_design.problem import Goal, evaluate
 from tpm_design.report import write_report
 from tpm_design.report.aspect import choose_aspect, middle_of
 from tpm_design.report.escape import code, code_cell, table, text
+from tpm_design.report.figures import DRAWING, pictures
 from tpm_design.report.history import history
 from tpm_design.report.readings import readings
 from tpm_design.report.reported import best_context, read_reported
@@ -115,7 +117,7 @@ def rows_of(markdown: str) -> dict[str, list[str]]:
 
 def test_the_report_and_its_figures_are_written(run_folder: Path) -> None:
     paths = write_report(run_folder)
-    names = ["workspace.png", "conditioning.png", "constraints.png", "convergence.png"]
+    names = ["mechanism.png", "workspace.png", "conditioning.png", "constraints.png", "convergence.png"]
     assert paths == (run_folder / "report.md", *(run_folder / "figures" / name for name in names))
     markdown = paths[0].read_text(encoding="utf-8")
     for path in paths[1:]:
@@ -123,6 +125,20 @@ def test_the_report_and_its_figures_are_written(run_folder: Path) -> None:
         assert 900 <= width <= 2400
         assert 400 <= height <= 1500
         assert f"(figures/{path.name})" in markdown
+
+
+def test_the_design_is_drawn_with_its_own_dimensions_after_its_table(run_folder: Path) -> None:
+    reported = read_reported(run_folder)
+    assert reported.best is not None
+    (picture,) = (found for found in pictures(reported) if found.file == DRAWING)
+    words = " ".join(text.get_text() for text in picture.figure.axes[0].texts)
+    for name, symbol in (("f", "f_{1}"), ("r", "r_{1}")):
+        value = reported.study.units.written(float(reported.best.evaluation.design[name]), "m", 4)
+        assert f"${symbol}$$\\mathrm{{\\,=\\,{value.replace(' ', chr(92) + ' ')}}}$" in words
+    markdown = (run_folder / "report.md").read_text(encoding="utf-8")
+    headings = re.findall(r"^## (.*)$", markdown, re.MULTILINE)
+    assert headings[headings.index("Mechanism") - 1].startswith("Best design")
+    assert "*LaMaViP 3-URU in the middle of the useful region.*" in markdown
 
 
 def test_two_reports_of_a_run_are_the_same_bytes(run_folder: Path) -> None:
@@ -190,7 +206,7 @@ def test_names_from_the_study_stay_names(run_folder: Path) -> None:
     assert sum(t.type == "code_inline" and t.content == HOSTILE for t in inline) >= 2
     assert not any(token.type.startswith("html") for token in [*tokens, *inline])
     emphasis = [inline[place + 1].content for place, t in enumerate(inline) if t.type == "em_open"]
-    assert len(emphasis) == 4  # what the figures show
+    assert len(emphasis) == 5  # what the figures show
     assert "least" not in emphasis
     assert next(t for t in tokens if t.type == "inline").children[0].content.startswith("quick")
 

@@ -107,13 +107,19 @@ def show(
     name: Annotated[
         str, typer.Argument(help="A mechanism, metric, optimizer or region, or a mechanism's Python file.")
     ],
+    drawing: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write a labelled line drawing of a mechanism: FILE.svg or FILE.png."
+        ),
+    ] = None,
     allow_code: AllowCode = False,
     as_json: Json = False,
 ) -> int | None:
     """Explain one of them: parameters, units, options, source of its equations."""
     from tpm_design.cli.catalogue import show_thing
 
-    return show_thing(name, allow_code=allow_code, as_json=as_json)
+    return show_thing(name, drawing, allow_code=allow_code, as_json=as_json)
 
 
 @app.command()

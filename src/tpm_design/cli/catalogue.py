@@ -17,6 +17,7 @@ from tpm_design.metrics import METRICS
 from tpm_design.metrics.base import Metric, Option
 from tpm_design.optimizers import OPTIMIZERS
 from tpm_design.optimizers.base import Optimizer
+from tpm_design.report.facts import CONVENTION, mechanism_facts
 from tpm_design.study.plug_in import kind_in_file
 from tpm_design.workspace.regions import REGIONS, RegionForm
 
@@ -54,8 +55,10 @@ def summary(thing: Thing) -> str:
     return thing.title if isinstance(thing, MechanismKind) else thing.description
 
 
-def show_thing(name: str, *, allow_code: bool, as_json: bool) -> int | None:
+def show_thing(name: str, drawing: Path | None, *, allow_code: bool, as_json: bool) -> int | None:
     thing = _from_file(Path(name), allow_code) if name.endswith(".py") else _registered(name)
+    if drawing is not None:
+        return _write_drawing(name, thing, drawing)
     if as_json:
         print(json.dumps(_data(thing), ensure_ascii=False))
     elif isinstance(thing, MechanismKind):
@@ -87,30 +90,29 @@ def _from_file(path: Path, allow_code: bool) -> MechanismKind:
     return kind_in_file(path)
 
 
+def _write_drawing(name: str, thing: Thing, path: Path) -> int | None:
+    if not isinstance(thing, MechanismKind):
+        raise UsageError(
+            f"{name} is not a mechanism: there is nothing to draw.",
+            where="--drawing",
+            remedy=f"Known mechanisms: {', '.join(MECHANISMS)}.",
+        )
+    from tpm_design.report import write_drawing
+
+    write_drawing(thing, path)
+    print(f"Wrote {path}.")
+    return None
+
+
 def _mechanism_text(kind: MechanismKind) -> str:
-    units = {"length": "length", "angle": "angle", "ratio": "–"}
-    parameters = [
-        [p.name, p.symbol, units[p.dimension], p.domain, "yes" if p.per_limb else "no", p.description]
-        for p in kind.parameters
-    ]
-    modes = [
-        [f.name, f"{f.length} signs" + (' or "any"' if f.any_allowed else ""), f.description]
-        for f in kind.mode_fields
-    ]
-    limits = [[x.name, units[x.dimension], x.kind, x.description] for x in kind.limits]
-    singularities = [[s.name, s.equation, s.condition] for s in kind.singularities]
-    drives = ", ".join(kind.drives)
-    tables = [
-        (["parameter", "symbol", "unit", "must be", "limb by limb", "what it is"], parameters),
-        (["working mode", "value", "what it is"], modes),
-        (["limit", "unit", "form", "what it is"], limits),
-        (["singularity", "equation", "condition"], singularities),
-    ]
-    head = (
-        f"{kind.name}: {kind.title}\nSource: {kind.source}\nPose: {', '.join(kind.pose)} (length). "
-        f"Actuator coordinates: {kind.limb_count}, in {kind.actuator_unit}; driven by: {drives}."
+    facts = mechanism_facts(kind)
+    lines = [f"{kind.name}: {kind.title}", f"Source: {kind.source}"]
+    lines += [f"{name}: {words}" for name, words in facts.lines]
+    lines += [CONVENTION, f"Drawing: tpm-design show {kind.name} --drawing {kind.name}.svg"]
+    remarks = ["Remarks:\n" + "\n".join(f"- {remark}" for remark in facts.remarks)] if facts.remarks else []
+    return "\n\n".join(
+        ["\n".join(lines), *(table(one.headings, one.rows) for one in facts.tables if one.rows), *remarks]
     )
-    return "\n\n".join([head, *(table(headings, rows) for headings, rows in tables if rows)])
 
 
 def _metric_text(metric: Metric) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
@@ -68,6 +69,32 @@ class Singularity:
 
 
 @dataclass(frozen=True)
+class Drawing:
+    """What the line drawing of a mechanism needs beside ``equations.joint_centres``.
+
+    ``joints``: one letter for each centre of a limb from the base, ``A`` for A_1, A_2, A_3; ``()``: they stay
+    without names. ``driven``: the joint that the motor moves. ``slides_from``: for one that slides, the point
+    where its coordinate is 0: a letter of its own, a joint, or ``O``. ``parallelogram``: the joints that two
+    parallel rods connect, if any.
+
+    ``marks``: a parameter's name, or a symbol such as ``q_i`` → where it is written on limb 1: at a point
+    ``("A",)``, along a length ``("A", "C")``, or in an angle ``("OA", "A", "C")``, its vertex in the middle.
+    Points are joints, ``O`` the origin, and of the platform ``P``, its position, or ``M``, the middle of its
+    joints, where poses are not positions. Directions are ``+x`` … ``-z``,
+    ``+rail`` and ``OA``, from O to A; a length along a direction is as long as its parameter.
+
+    ``pose``: where the example is drawn; None: at a pose well inside the workspace.
+    """
+
+    joints: tuple[str, ...] = ()
+    driven: str = ""
+    slides_from: str = ""
+    parallelogram: tuple[str, ...] = ()
+    marks: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: MappingProxyType({}))
+    pose: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
 class MechanismKind:
     """Everything the program knows about one mechanism before dimensions are chosen.
 
@@ -80,6 +107,7 @@ class MechanismKind:
     it; None where the limbs are not placed alike.
     ``mode_candidates(ranges, isotropic)``: sign strings of one working mode of each set that symmetry
     makes equal for every design of the ranges; None: all modes count as different.
+    ``remarks``: what a user should know besides, one sentence or more each.
     """
 
     name: str
@@ -101,6 +129,8 @@ class MechanismKind:
     transmission_drive: str | None = "motor"
     limb_rotation: Rotation | None = None
     mode_candidates: ModeCandidates | None = None
+    remarks: tuple[str, ...] = ()
+    drawing: Drawing = Drawing()
 
     @property
     def translational(self) -> bool:

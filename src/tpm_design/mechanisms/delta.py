@@ -20,7 +20,7 @@ from tpm_design.arithmetic.lifting import replaced
 from tpm_design.mechanisms import equations, forward
 from tpm_design.mechanisms.angles import THIRD_TURN, cosine_sine, enclosed_cosine_sine
 from tpm_design.mechanisms.assembly import Assembly
-from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
+from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.joint_limits import JointRange, enclosed_range, joint_range, range_numbers
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.mechanisms.parallelograms import rotation_determinant
@@ -407,4 +407,20 @@ KIND = MechanismKind(
     build=build,
     farthest_reach=farthest_reach,
     limb_rotation=THIRD_TURN,
+    drawing=Drawing(
+        joints=("A", "C", "B"),
+        driven="A",
+        parallelogram=("C", "B"),
+        marks=MappingProxyType(
+            {
+                "L": ("A", "C"),
+                "l": ("C", "B"),
+                "w": ("O", "A"),
+                "u": ("P", "B"),
+                "azimuth": ("+x", "O", "A"),
+                "θ_i": ("OA", "A", "C"),
+            }
+        ),
+        pose=(0.15, 0.2, -1.2),
+    ),
 )

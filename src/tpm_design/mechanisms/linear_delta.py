@@ -21,7 +21,7 @@ from tpm_design.arithmetic.lifting import replaced
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.angles import THIRD_TURN, cosine_sine, enclosed_cosine_sine
 from tpm_design.mechanisms.assembly import Assembly
-from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
+from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.mechanisms.parallelograms import rotation_determinant
 from tpm_design.mechanisms.parameters import enclosed_values, limb_values, span, swing_limit
@@ -293,4 +293,22 @@ KIND = MechanismKind(
     build=build,
     farthest_reach=farthest_reach,
     limb_rotation=THIRD_TURN,
+    drawing=Drawing(
+        joints=("A", "C", "B"),
+        driven="C",
+        slides_from="A",
+        parallelogram=("C", "B"),
+        marks=MappingProxyType(
+            {
+                "l": ("C", "B"),
+                "R": ("O", "A"),
+                "r": ("P", "B"),
+                "q_i": ("A", "C"),
+                "rail": ("A", "+rail"),
+                "azimuth": ("+x", "O", "A"),
+                "tilt": ("-z", "A", "+rail"),
+            }
+        ),
+        pose=(0.06, -0.04, -0.47),
+    ),
 )

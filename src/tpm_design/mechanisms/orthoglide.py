@@ -21,7 +21,7 @@ from tpm_design.arithmetic.lifting import replaced
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.angles import NEXT_AXIS
 from tpm_design.mechanisms.assembly import Assembly
-from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
+from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.cylinders import reach_of_cylinders
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.mechanisms.parameters import enclosed_values, limb_values, span, swing_limit
@@ -238,4 +238,11 @@ KIND = MechanismKind(
     build=build,
     farthest_reach=farthest_reach,
     limb_rotation=NEXT_AXIS,
+    drawing=Drawing(
+        joints=("A", "B"),
+        driven="A",
+        slides_from="O",
+        marks=MappingProxyType({"L": ("A", "B"), "d": ("P", "B"), "q_i": ("O", "A")}),
+        pose=(-0.05, -0.09, -0.12),
+    ),
 )  # fmt: skip

@@ -37,7 +37,7 @@ from tpm_design.arithmetic.lifting import constant, replaced
 from tpm_design.mechanisms import equations, forward
 from tpm_design.mechanisms.angles import NEXT_AXIS
 from tpm_design.mechanisms.assembly import Assembly
-from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
+from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.joint_limits import enclosed_range, joint_range, range_numbers
 from tpm_design.mechanisms.mechanism import FloatArray, Mechanism, Mode
 from tpm_design.mechanisms.parameters import enclosed_values, limb_values, span, three_numbers
@@ -650,4 +650,19 @@ KIND = MechanismKind(
     build=build,
     farthest_reach=farthest_reach,
     mode_candidates=mode_candidates,
+    drawing=Drawing(
+        joints=("A", "C", "B"),
+        driven="A",
+        marks=MappingProxyType(
+            {
+                "f": ("A", "C"),
+                "r": ("C", "B"),
+                "db": ("O", "A"),
+                "dp": ("P", "B"),
+                "k": ("A",),
+                "θ_i2": ("+x", "A", "C"),
+            }
+        ),
+        pose=(0.06, 0.19, 0.08),
+    ),
 )

@@ -7,14 +7,19 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from tpm_design.metrics.context import Context
 from tpm_design.report.convergence import convergence_figure, convergence_finding
+from tpm_design.report.drawing import mechanism_figure
+from tpm_design.report.good_pose import good_pose
 from tpm_design.report.maps import conditioning_figure, workspace_figure
 from tpm_design.report.reported import Reported, best_context
 from tpm_design.report.rooms import rooms_figure, rooms_finding
 from tpm_design.report.style import save
 from tpm_design.report.survey import conditioning_shown, has_conditioning, survey
+from tpm_design.units import Units
 
 FIGURES = "figures"
+DRAWING = "mechanism.png"
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,9 @@ class Picture:
 def pictures(reported: Reported) -> tuple[Picture, ...]:
     """What there is to draw of a run, in the order of the report."""
     rooms, course = rooms_figure(reported), convergence_figure(reported)
-    found = _slice_pictures(reported)
+    context = best_context(reported)
+    found = [] if context is None else _drawings(context, reported.study.units)
+    found += _slice_pictures(reported)
     if rooms is not None:
         found.append(
             Picture(
@@ -51,6 +58,20 @@ def pictures(reported: Reported) -> tuple[Picture, ...]:
             )
         )
     return tuple(found)
+
+
+def _drawings(context: Context, units: Units) -> list[Picture]:
+    """The machine in the middle of its useful region; where it cannot be there, well inside its workspace."""
+    machine, mode = context.mechanism, context.mode
+    places = {"well inside its workspace": good_pose(machine, mode)}
+    if context.region is not None and machine.kind.translational:
+        places = {"in the middle of the useful region": context.region.centre, **places}
+    for where, pose in places.items():
+        figure = None if pose is None else mechanism_figure(machine, mode, pose, units)
+        if figure is not None:
+            caption = "Limb 1 carries the names and its own dimensions; the links are to scale."
+            return [Picture(DRAWING, f"{machine.kind.title} {where}", caption, figure)]
+    return []
 
 
 def _slice_pictures(reported: Reported) -> list[Picture]:

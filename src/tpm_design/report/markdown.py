@@ -10,7 +10,7 @@ from tpm_design.certificates.document import FILE as CERTIFICATE
 from tpm_design.problem import Evaluation, Goal
 from tpm_design.report.certified import certificate_lines
 from tpm_design.report.escape import code, code_cell, table, text
-from tpm_design.report.figures import FIGURES, Picture
+from tpm_design.report.figures import DRAWING, FIGURES, Picture
 from tpm_design.report.readings import AT_BOUND, at_end, limiting, nearest_constraint, readings
 from tpm_design.report.reported import Reported
 from tpm_design.report.words import MOST_LISTED, asked, centre_text, options_text, range_text, shape_text
@@ -35,11 +35,12 @@ def report_markdown(reported: Reported, pictures: Sequence[Picture]) -> str:
         _head(reported),
         _question(reported),
         _design(reported),
+        _figures("Mechanism", [picture for picture in pictures if picture.file == DRAWING]),
         _metrics(reported),
         certificate_lines(reported),
         _limits(reported),
         _search(reported),
-        _figures(pictures),
+        _figures("Figures", [picture for picture in pictures if picture.file != DRAWING]),
         _caveats(reported),
         _files(reported),
     ]
@@ -281,8 +282,8 @@ def _provenance(summary: Any) -> Iterable[str]:
         yield text("machine: " + ", ".join(f"{name} {value}" for name, value in machine.items()))
 
 
-def _figures(pictures: Sequence[Picture]) -> list[str]:
-    lines = ["## Figures"] if pictures else []
+def _figures(heading: str, pictures: Sequence[Picture]) -> list[str]:
+    lines = [f"## {heading}"] if pictures else []
     for picture in pictures:
         finding = text(picture.finding)
         lines += ["", f"![{finding}]({FIGURES}/{picture.file})", "", f"*{finding}.* {picture.caption}"]

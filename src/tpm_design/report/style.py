@@ -1,6 +1,7 @@
 """How figures look: one palette that colour-blind readers can tell apart, one set of sizes.
 
-Figures are made through matplotlib's objects, never through its global state.
+Figures are made through matplotlib's objects, not through its global state; only what SVG files need is set
+there while one is written.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import textwrap
 from pathlib import Path
 from typing import Literal
 
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -23,9 +25,9 @@ DPI = 150
 TITLE, TEXT, SMALL = 12.0, 10.0, 9.0
 
 
-def new_figure(width: float, height: float, layout: Literal["constrained", "compressed"]) -> Figure:
+def new_figure(width: float, height: float, layout: Literal["constrained", "compressed"] | None) -> Figure:
     """An empty figure (inches) whose parts keep clear of each other. ``layout`` "compressed": for axes of
-    equal scales."""
+    equal scales; None: for axes that have their place."""
     figure = Figure(figsize=(width, height), dpi=DPI, layout=layout, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
@@ -58,5 +60,9 @@ def tidy(axes: Axes) -> None:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """PNG at 150 dpi."""
-    figure.savefig(path, dpi=DPI, format="png")
+    """PNG at 150 dpi, or SVG by the name of the file; the same figure gives the same bytes."""
+    if path.suffix == ".svg":
+        with rc_context({"svg.hashsalt": "tpm-design", "svg.fonttype": "path"}):
+            figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
+    else:
+        figure.savefig(path, dpi=DPI, format="png")
