@@ -86,13 +86,11 @@ def test_axes_at_right_angles_make_the_machine_isotropic_everywhere(name: str) -
 
 def test_prrr_is_isotropic_where_all_p_joints_make_one_angle_with_their_axes() -> None:
     angle = 0.7
-    machine = tpm.mechanism(
-        "prrr",
-        f=0.4,
-        r=0.3,
-        slide_azimuth=(angle, 0.5 * math.pi + angle, 0.3),
-        slide_elevation=(0.0, 0.0, 0.5 * math.pi - angle),
-    )
+    angles = {
+        "slide_azimuth": (angle, 0.5 * math.pi + angle, 0.3),
+        "slide_elevation": (0.0, 0.0, 0.5 * math.pi - angle),
+    }
+    machine = MECHANISMS["prrr"].build({"f": 0.4, "r": 0.3, **angles}, {})
     mode = machine.mode_of({"elbows": "+++"})
     values = np.linalg.svd(machine.jacobian(reachable(machine, mode, 50), mode), compute_uv=False)
     assert np.abs(values - math.cos(angle)).max() < 1e-12
@@ -101,7 +99,7 @@ def test_prrr_is_isotropic_where_all_p_joints_make_one_angle_with_their_axes() -
 def test_the_tricylinder_by_rays_by_a_grid_and_between_proved_bounds() -> None:
     radius = 0.9
     exact = 8.0 * (2.0 - math.sqrt(2.0)) * radius**3
-    machine = tpm.mechanism("crr", f=0.45, r=0.45)
+    machine = MECHANISMS["crr"].build({"f": 0.45, "r": 0.45}, {})
     mode = machine.mode_of({"elbows": "+++"})
     by_rays = tpm.workspace_volume(machine, mode, kind="singularity_free", rtol=1e-3)
     assert abs(by_rays.value / exact - 1.0) < 1e-3

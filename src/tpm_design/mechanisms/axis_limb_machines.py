@@ -117,6 +117,15 @@ def limb_limits(parameters: Mapping[str, tuple[float, ...]], limits: Mapping[str
     )
 
 
+def point_fields(parameters: Mapping[str, tuple[Any, ...]]) -> dict[str, Any]:
+    """Base and platform points as fields of the geometry, of floats or Intervals."""
+    fields: dict[str, Any] = {
+        f"offset_{a[1]}": tuple(x - y for x, y in zip(parameters[a], parameters[b], strict=True))
+        for a, b in zip(BASE, PLATFORM, strict=True)
+    }
+    return fields | {"platform": tuple(zip(*(parameters[name] for name in PLATFORM), strict=True))}
+
+
 def limb_geometry(
     parameters: Mapping[str, tuple[float, ...]], directions: LimbDirections, limits: Mapping[str, Any]
 ) -> AxisLimbGeometry:
@@ -124,7 +133,7 @@ def limb_geometry(
     return AxisLimbGeometry(
         first=parameters["f"],
         second=parameters["r"],
-        **{name: parameters[name] for name in (*BASE, *PLATFORM)},
+        **point_fields(parameters),
         directions=directions,
         limits=limb_limits(parameters, limits),
         link_radius=float(limits.get("link_radius", 0.0)),
@@ -133,11 +142,8 @@ def limb_geometry(
 
 def offsets_of(parameters: Mapping[str, tuple[float, ...]]) -> list[Vector]:
     """a_i0 − b_i of each limb (m): where P is with the platform joint at the base point."""
-    found = []
-    for limb in range(3):
-        x, y, z = (parameters[a][limb] - parameters[b][limb] for a, b in zip(BASE, PLATFORM, strict=True))
-        found.append((x, y, z))
-    return found
+    fields = point_fields(parameters)
+    return list(zip(fields["offset_x"], fields["offset_y"], fields["offset_z"], strict=True))
 
 
 def reach_bound(
@@ -202,7 +208,7 @@ class AxisLimbMechanism(Mechanism):
         intervals: dict[str, Any] = {
             "first": held["f"],
             "second": held["r"],
-            **{name: held[name] for name in (*BASE, *PLATFORM)},
+            **point_fields(held),
             "directions": limb_directions(self.parameters, slides=self.slides, enclosed=True),
             "limits": limits._replace(**enclosed),
         }
@@ -218,10 +224,7 @@ class AxisLimbMechanism(Mechanism):
         axis = enclosed.directions.axis
         sides = []
         for limb in range(3):
-            offset = [
-                getattr(enclosed, a)[limb] - getattr(enclosed, b)[limb]
-                for a, b in zip(BASE, PLATFORM, strict=True)
-            ]
+            offset = (enclosed.offset_x[limb], enclosed.offset_y[limb], enclosed.offset_z[limb])
             sides.append(enclosed.directions.advance[limb] * float(strokes[limb]) + dot(axis[limb], offset))
         columns = (cross(axis[1], axis[2]), cross(axis[2], axis[0]), cross(axis[0], axis[1]))
         scale = dot(axis[0], columns[0])

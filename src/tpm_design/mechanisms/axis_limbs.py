@@ -58,16 +58,15 @@ class LimbLimits(NamedTuple):
 
 
 class AxisLimbGeometry(NamedTuple):
-    """Per limb: lengths of the links and coordinates of base and platform point (m)."""
+    """Per limb: lengths of the links, coordinates of a_i0 − b_i, which is all that its motion knows of both
+    points, and the platform point b_i (m)."""
 
     first: Triple
     second: Triple
-    ax: Triple
-    ay: Triple
-    az: Triple
-    bx: Triple
-    by: Triple
-    bz: Triple
+    offset_x: Triple
+    offset_y: Triple
+    offset_z: Triple
+    platform: tuple[Triple, ...]
     directions: LimbDirections
     limits: LimbLimits
     link_radius: float
@@ -114,11 +113,7 @@ def axis_row(geometry, limb, x):  # type: ignore[no-untyped-def]
 
 
 def _limb_offset(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
-    return (
-        x + (geometry.bx[limb] - geometry.ax[limb]),
-        y + (geometry.by[limb] - geometry.ay[limb]),
-        z + (geometry.bz[limb] - geometry.az[limb]),
-    )
+    return x - geometry.offset_x[limb], y - geometry.offset_y[limb], z - geometry.offset_z[limb]
 
 
 def _limb_point(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
@@ -184,9 +179,14 @@ def _limb_joints(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def
     dx, dy, dz = geometry.directions.slide[limb]
     gx, gy, gz = geometry.directions.across[limb]
     hx, hy, hz = geometry.directions.beyond[limb]
-    px, py, pz = x + geometry.bx[limb], y + geometry.by[limb], z + geometry.bz[limb]
+    bx, by, bz = geometry.platform[limb]
+    px, py, pz = x + bx, y + by, z + bz
     return (
-        (geometry.ax[limb] + stroke * dx, geometry.ay[limb] + stroke * dy, geometry.az[limb] + stroke * dz),
+        (
+            geometry.offset_x[limb] + bx + stroke * dx,
+            geometry.offset_y[limb] + by + stroke * dy,
+            geometry.offset_z[limb] + bz + stroke * dz,
+        ),
         (px - r * (a * gx + c * hx), py - r * (a * gy + c * hy), pz - r * (a * gz + c * hz)),
         (px, py, pz),
     )
@@ -266,23 +266,19 @@ def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def
 
 
 def _limb_parameters(geometry, limb):  # type: ignore[no-untyped-def]
-    """f, r, and both points."""
+    """f, r, and the coordinates of a − b."""
     return (
         geometry.first[limb],
         geometry.second[limb],
-        geometry.ax[limb],
-        geometry.ay[limb],
-        geometry.az[limb],
-        geometry.bx[limb],
-        geometry.by[limb],
-        geometry.bz[limb],
+        geometry.offset_x[limb],
+        geometry.offset_y[limb],
+        geometry.offset_z[limb],
     )
 
 
 def axis_limb_equations(geometry_class: type) -> None:
-    """Register what all mechanisms of this kind have in common for a geometry with the lengths ``first``,
-    ``second`` and points ``ax`` to ``bz``, each per limb, ``directions`` and ``limits``. It gives
-    ``with_limb_parameters`` itself."""
+    """Register what all mechanisms of this kind have in common for a geometry that has what
+    ``AxisLimbGeometry`` has. It gives ``with_limb_parameters`` itself."""
     formula(limb_offset, geometry_class)(_limb_offset)
     formula(limb_point, geometry_class)(_limb_point)
     formula(limb_stroke, geometry_class)(_limb_stroke)
@@ -307,16 +303,14 @@ axis_limb_equations(AxisLimbGeometry)
 
 @formula(equations.with_limb_parameters, AxisLimbGeometry)
 def _with_limb_parameters(geometry, limb, values):  # type: ignore[no-untyped-def]
-    """f, r, and both points of one limb replaced."""
+    """f, r, and a − b of one limb replaced."""
     return AxisLimbGeometry(
         replaced(geometry.first, limb, values[0]),
         replaced(geometry.second, limb, values[1]),
-        replaced(geometry.ax, limb, values[2]),
-        replaced(geometry.ay, limb, values[3]),
-        replaced(geometry.az, limb, values[4]),
-        replaced(geometry.bx, limb, values[5]),
-        replaced(geometry.by, limb, values[6]),
-        replaced(geometry.bz, limb, values[7]),
+        replaced(geometry.offset_x, limb, values[2]),
+        replaced(geometry.offset_y, limb, values[3]),
+        replaced(geometry.offset_z, limb, values[4]),
+        geometry.platform,
         geometry.directions,
         geometry.limits,
         geometry.link_radius,

@@ -38,17 +38,15 @@ from tpm_design.mechanisms.parameters import limb_values
 
 
 class CrrrGeometry(NamedTuple):
-    """Per limb: lengths of the links and coordinates of base and platform point (m). ``rotation``: det of the
-    unit vectors about which the limbs keep the platform from turning."""
+    """As ``AxisLimbGeometry``. ``rotation``: det of the unit vectors about which the limbs keep the platform
+    from turning."""
 
     first: Triple
     second: Triple
-    ax: Triple
-    ay: Triple
-    az: Triple
-    bx: Triple
-    by: Triple
-    bz: Triple
+    offset_x: Triple
+    offset_y: Triple
+    offset_z: Triple
+    platform: tuple[Triple, ...]
     directions: LimbDirections
     limits: LimbLimits
     link_radius: float
@@ -60,16 +58,14 @@ axis_limb_equations(CrrrGeometry)
 
 @formula(equations.with_limb_parameters, CrrrGeometry)
 def _with_limb_parameters(geometry, limb, values):  # type: ignore[no-untyped-def]
-    """f, r, and both points of one limb replaced."""
+    """f, r, and a − b of one limb replaced."""
     return CrrrGeometry(
         replaced(geometry.first, limb, values[0]),
         replaced(geometry.second, limb, values[1]),
-        replaced(geometry.ax, limb, values[2]),
-        replaced(geometry.ay, limb, values[3]),
-        replaced(geometry.az, limb, values[4]),
-        replaced(geometry.bx, limb, values[5]),
-        replaced(geometry.by, limb, values[6]),
-        replaced(geometry.bz, limb, values[7]),
+        replaced(geometry.offset_x, limb, values[2]),
+        replaced(geometry.offset_y, limb, values[3]),
+        replaced(geometry.offset_z, limb, values[4]),
+        geometry.platform,
         geometry.directions,
         geometry.limits,
         geometry.link_radius,

@@ -76,8 +76,8 @@ def limb_clearance(geometry: Any, mode: Any, x: Any, y: Any, z: Any) -> Any:
 
 
 def limb_parameters(geometry: Any, limb: Any) -> Any:
-    """One limb's parameters, a tuple of one kind of number in the order of ``MechanismKind.parameters``
-    (those that every limb has)."""
+    """One limb's lengths and ratios, a tuple of one kind of number: all on which its margins and velocities
+    depend, each parameter or a combination of some."""
     raise NotImplementedError
 
 

@@ -44,7 +44,8 @@ name: {flow_yaml(name)}
 units: {{length: mm, angle: deg}}    # of every number in this file; mm, cm, m, in; deg, rad
 mechanism:
   type: {kind.name}    # {kind.title}
-  # number: fixed; {{min, max, initial}}: free, initial may be left out; {{values: [1, 2]}}: one of these
+  # number: fixed; {{min, max, initial}}: free, initial may be left out; {{values: [1, 2]}}: one of these;
+  # {{equals: f}}: always the value of f
   parameters:
 {chr(10).join(lines)}{mode}{limits}
   limits: {{}}
