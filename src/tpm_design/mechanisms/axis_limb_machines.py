@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -19,7 +20,7 @@ from tpm_design.mechanisms import forward
 from tpm_design.mechanisms.angles import QUARTER, cosine_sine, enclosed_cosine_sine, unit_vector
 from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.axis_limbs import AxisLimbGeometry, ElbowSigns, LimbDirections, LimbLimits
-from tpm_design.mechanisms.base import Limit, MechanismKind, ModeField, Parameter, Singularity
+from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.cylinders import reach_of_cylinders
 from tpm_design.mechanisms.fold_lines import FoldLine, Vector
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
@@ -301,4 +302,23 @@ LIMITS = (
 SINGULARITIES = (
     Singularity("serial", "a limb stretched or folded: |sin| of its elbow is 0", "section 6.1"),
     Singularity("actuation", "det of the axes' directions, constant: never 0", "section 5.3"),
+)
+
+DRAWING = Drawing(
+    joints=("C", "E", "B"),
+    driven="C",
+    slides_from="A",
+    marks=MappingProxyType(
+        {
+            "f": ("C", "E"),
+            "r": ("E", "B"),
+            "S_i": ("A", "C"),
+            "ax": ("O", "+x"),
+            "ay": ("O", "+y"),
+            "az": ("O", "+z"),
+            "bx": ("P", "+x"),
+            "by": ("P", "+y"),
+            "bz": ("P", "+z"),
+        }
+    ),
 )

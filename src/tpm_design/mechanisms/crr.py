@@ -13,6 +13,7 @@ from typing import Any
 
 from tpm_design.mechanisms.angles import NEXT_AXIS
 from tpm_design.mechanisms.axis_limb_machines import (
+    DRAWING,
     LIMITS,
     MODE_FIELDS,
     PARAMETERS,
@@ -57,4 +58,5 @@ KIND = MechanismKind(
     build=build,
     farthest_reach=farthest_reach,
     limb_rotation=NEXT_AXIS,
+    drawing=DRAWING,
 )

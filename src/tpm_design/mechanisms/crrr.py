@@ -19,6 +19,7 @@ from tpm_design.errors import ParameterError
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.angles import NEXT_AXIS, QUARTER, enclosed_unit_vector, unit_vector
 from tpm_design.mechanisms.axis_limb_machines import (
+    DRAWING,
     LIMITS,
     MODE_FIELDS,
     PARAMETERS,
@@ -173,4 +174,5 @@ KIND = MechanismKind(
     build=build,
     farthest_reach=farthest_reach,
     limb_rotation=NEXT_AXIS,
+    drawing=DRAWING,
 )  # fmt: skip

@@ -15,6 +15,7 @@ from typing import Any
 from tpm_design.errors import ParameterError
 from tpm_design.mechanisms.angles import NEXT_AXIS, QUARTER
 from tpm_design.mechanisms.axis_limb_machines import (
+    DRAWING,
     LIMITS,
     MODE_FIELDS,
     PARAMETERS,
@@ -90,4 +91,5 @@ KIND = MechanismKind(
     build=build,
     farthest_reach=farthest_reach,
     limb_rotation=NEXT_AXIS,
+    drawing=DRAWING,
 )  # fmt: skip
