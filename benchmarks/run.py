@@ -9,7 +9,7 @@ from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 
-NAMES = ("startup", "point_kernel", "enclosures", "volume", "certified_volume", "certificate", "study")
+NAMES = ("startup", "mechanisms", "enclosures", "volume", "certified_volume", "certificate", "study")
 
 
 def main() -> None:

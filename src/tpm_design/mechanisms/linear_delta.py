@@ -58,7 +58,7 @@ class LinearDeltaGeometry(NamedTuple):
     link_radius: float
 
 
-rail_equations(LinearDeltaGeometry)
+rail_equations(LinearDeltaGeometry, on_axes=False)
 
 
 @formula(anchor, LinearDeltaGeometry)

@@ -170,12 +170,12 @@ class Mechanism(ABC):
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         legs, side = np.empty(x.size), np.empty(x.size)
         determinants = np.empty((len(self.kind.determinants), x.size))
-        pointwise.reach_row(self.geometry, mode.signs, x, y, z, legs, side)
-        pointwise.singularity_row(self.geometry, mode.signs, x, y, z, determinants)
+        pointwise.margins_row(self.geometry, mode.signs, x, y, z, legs, side, determinants)
         return legs, side, determinants
 
     def _usable(self, x: FloatArray, y: FloatArray, z: FloatArray, mode: Mode) -> NDArray[np.bool_]:
-        legs, side, _ = self._margins(x, y, z, mode)
+        legs, side = np.empty(x.size), np.empty(x.size)
+        pointwise.reach_row(self.geometry, mode.signs, x, y, z, legs, side)
         # coordinate planes belong to no octant: strictly inside
         return (legs >= 0.0) & (side > 0.0)
 

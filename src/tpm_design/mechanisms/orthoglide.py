@@ -56,7 +56,7 @@ class OrthoglideGeometry(NamedTuple):
     link_radius: float
 
 
-rail_equations(OrthoglideGeometry)
+rail_equations(OrthoglideGeometry, on_axes=True)
 
 
 @formula(anchor, OrthoglideGeometry)

@@ -6,24 +6,52 @@ from typing import Any
 
 from tpm_design.arithmetic import root, sqr
 from tpm_design.arithmetic.algebra import determinant
-from tpm_design.arithmetic.compilation import STRICT
+from tpm_design.arithmetic.compilation import FAST, STRICT, is_number
 
 # isort: split
-from numba.extending import register_jitable
+from numba import types
+from numba.extending import overload
 
 
-@register_jitable(**STRICT)
+def unit_normal(rod: Any, bar: Any) -> Any:
+    """Unit vector of rod × bar. In compiled code."""
+    raise NotImplementedError
+
+
 def _unit_normal(rod: Any, bar: Any) -> Any:
     x = rod[1] * bar[2] - rod[2] * bar[1]
     y = rod[2] * bar[0] - rod[0] * bar[2]
     z = rod[0] * bar[1] - rod[1] * bar[0]
-    length = root(sqr(x) + sqr(y) + sqr(z))
-    return x / length, y / length, z / length
+    scale = 1.0 / root(sqr(x) + sqr(y) + sqr(z))
+    return x * scale, y * scale, z * scale
 
 
-@register_jitable(**STRICT)
 def rotation_determinant(rods: Any, bars: Any) -> Any:
     """det of the unit normals n_i ∥ rod_i × bar_i, unit vectors along the rods and the short bars of three
-    parallelograms: where it vanishes, the platform is free to turn."""
-    a, b, c = _unit_normal(rods[0], bars[0]), _unit_normal(rods[1], bars[1]), _unit_normal(rods[2], bars[2])
+    parallelograms: where it vanishes, the platform is free to turn. In compiled code."""
+    raise NotImplementedError
+
+
+def _rotation_determinant(rods: Any, bars: Any) -> Any:
+    a, b, c = unit_normal(rods[0], bars[0]), unit_normal(rods[1], bars[1]), unit_normal(rods[2], bars[2])
     return determinant(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2])
+
+
+def _numbers(kind: Any) -> bool:
+    """Whether a Numba type is a plain number or a tuple of such, at any depth."""
+    return all(map(_numbers, kind)) if isinstance(kind, types.BaseTuple) else is_number(kind)
+
+
+def _register(stub: Any, implementation: Any) -> None:
+    def for_floats(*arguments: Any) -> Any:
+        return implementation if all(map(_numbers, arguments)) else None
+
+    def for_others(*arguments: Any) -> Any:
+        return None if all(map(_numbers, arguments)) else implementation
+
+    overload(stub, jit_options=FAST, strict=False)(for_floats)
+    overload(stub, jit_options=STRICT, strict=False)(for_others)
+
+
+_register(unit_normal, _unit_normal)
+_register(rotation_determinant, _rotation_determinant)

@@ -38,6 +38,27 @@ def singularity_row(geometry, mode, x, y, z, determinants):  # type: ignore[no-u
             determinants[k, n] = values[k]
 
 
+@fast_kernel
+def margins_row(geometry, mode, x, y, z, legs, side, determinants):  # type: ignore[no-untyped-def]
+    """``reach_row`` and ``singularity_row`` in one go."""
+    for n in range(x.size):
+        # nothing is written before all is computed: what the equations have in common is then computed once
+        px, py, pz = x[n], y[n], z[n]
+        leg_margins = equations.leg_margins(geometry, mode, px, py, pz)
+        mode_margins = equations.mode_margins(geometry, mode, px, py, pz)
+        values = equations.singularity_margins(geometry, mode, px, py, pz)
+        least = leg_margins[0]
+        for margin in leg_margins:
+            least = min(least, margin)
+        legs[n] = least
+        least = mode_margins[0]
+        for margin in mode_margins:
+            least = min(least, margin)
+        side[n] = least
+        for k in range(len(values)):
+            determinants[k, n] = values[k]
+
+
 @kernel
 def frobenius_row(geometry, mode, motor, x, y, z, out):  # type: ignore[no-untyped-def]
     """1/κ_F (N,), written in place; NaN where undefined."""

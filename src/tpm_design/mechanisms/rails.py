@@ -84,6 +84,31 @@ def _limb_carriage(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-de
     return w[0] * ux + w[1] * uy + w[2] * uz - along_rail(geometry, limb, side) * h
 
 
+def _strut_on_axis(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
+    """As ``_limb_strut`` where rail i and anchor i are along the i-th axis: w along it and along the two axes
+    that follow, in place of both vectors."""
+    ax, ay, az = anchor(geometry, limb)
+    w = (x - ax, y, z) if limb == 0 else ((y - ay, z, x) if limb == 1 else (z - az, x, y))
+    square = sqr(w[1]) + sqr(w[2])
+    return w, root(square), root(sqr(geometry.strut[limb]) - square), w
+
+
+def _row_on_axis(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+    _, _, h, _ = limb_strut(geometry, limb, x, y, z)
+    length = geometry.strut[limb]
+    b = along_rail(geometry, limb, side) * h / length
+    if limb == 0:
+        return (b, y / length, z / length), b
+    if limb == 1:
+        return (x / length, b, z / length), b
+    return (x / length, y / length, b), b
+
+
+def _carriage_on_axis(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+    _, _, h, w = limb_strut(geometry, limb, x, y, z)
+    return w[0] - along_rail(geometry, limb, side) * h
+
+
 def _leg_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """l_i − |w_i × u_i|."""
     _, across1, _, _ = limb_strut(geometry, 0, x, y, z)
@@ -139,13 +164,14 @@ def _actuators(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-def rail_equations(geometry_class: type) -> None:
+def rail_equations(geometry_class: type, *, on_axes: bool) -> None:
     """Register what all mechanisms of this kind have in common for a geometry with ``rail`` (unit vectors),
     ``strut``, ``limited``, ``lowest`` and ``highest``. It gives ``anchor``, ``along_rail`` and
-    ``swing_margin`` itself."""
-    formula(limb_strut, geometry_class)(_limb_strut)
-    formula(limb_row, geometry_class)(_limb_row)
-    formula(limb_carriage, geometry_class)(_limb_carriage)
+    ``swing_margin`` itself. ``on_axes``: rails and anchors of the limbs are along x, y and z in turn,
+    and ``swing_margin`` does not look at w."""
+    formula(limb_strut, geometry_class)(_strut_on_axis if on_axes else _limb_strut)
+    formula(limb_row, geometry_class)(_row_on_axis if on_axes else _limb_row)
+    formula(limb_carriage, geometry_class)(_carriage_on_axis if on_axes else _limb_carriage)
     formula(equations.leg_margins, geometry_class)(_leg_margins)
     formula(equations.mode_margins, geometry_class)(_mode_margins)
     formula(equations.unit_velocity_map, geometry_class)(_unit_velocity_map)
