@@ -24,6 +24,8 @@ from tpm_design.checker.statements import (
 ROUNDING = 1e-12
 """What a pose on the surface of a region, a size at the end of its tolerance and a determinant on its locus
 may be off by."""
+INSIDE = 1e-10
+"""Share of the way from a region's middle to a pose that must be left to its surface."""
 
 
 def not_broken(requirement: Requirement, machine: Machine, region: Region | None) -> str | None:
@@ -53,7 +55,7 @@ def not_broken(requirement: Requirement, machine: Machine, region: Region | None
         return "no pose alone can break a coverage of less than 1"
     at = _configuration(machines, pose)
     inside = _within(region, pose, 0.0)
-    if inside and _unreachable(at, pose):
+    if inside and (_unreachable(at, pose) or _folded(at, region, pose)):
         return None
     if requirement.metric.endswith(DISTANCE):
         name = requirement.metric.removesuffix(DISTANCE)
@@ -98,6 +100,15 @@ def _wrong_side(at: Configuration, pose: Point, slack: float) -> bool:
 def _unreachable(at: Configuration, pose: Point) -> bool:
     """Proved to be out of reach or out of the mode."""
     return _wrong_side(at, pose, 0.0) or any(goal(at).value > 0 for goal in outside_goals(at))
+
+
+def _folded(at: Configuration, region: Region, pose: Point) -> bool:
+    """A limb is folded, to rounding, and the pose is not on the region's surface: farther from its middle it
+    is still inside."""
+    farther = tuple(c + (1.0 + INSIDE) * (p - c) for p, c in zip(pose, region.centre, strict=True))
+    if region.form == "points" or not Domain(region, 0.0).holds((farther[0], farther[1], farther[2]), 0.0):
+        return False
+    return any(at.margin(which).value.abs_upper() <= ROUNDING for which in at.setting.folds)
 
 
 def _out_of_reach(at: Configuration, pose: Point) -> bool:

@@ -46,12 +46,14 @@ class Setting:
     """What all machines within the tolerance have in common.
 
     ``reach``: margins in metres; ``within``: those of joints, of which the sign counts alone; ``sides``: of
-    the coordinate planes, ±1 or 0 for either.
+    the coordinate planes, ±1 or 0 for either. ``folds``: those of reach that bound a region even where they
+    are 0 on a line and nowhere negative.
     """
 
     reach: tuple[Margin, ...]
     within: tuple[Margin, ...] = ()
     sides: tuple[int, int, int] = (0, 0, 0)
+    folds: tuple[Margin, ...] = ()
 
 
 class Configuration(ABC):

@@ -222,6 +222,7 @@ def describe(made: Made, slide: str | None, idle: bool) -> tuple[Setting, Sizes]
             if end == "stretched" or not passes_its_fold(made, limb)
         ),
         within=tuple(Margin(name, limb) for limb in LIMBS for name in bounds),
+        folds=tuple(Margin("folded", limb) for limb in LIMBS if made.limits.get("fold", True) is not False),
         lines=tuple(line_of(made, slide, limb) for limb in LIMBS),
         idle_normals=tuple(idle_normal(made, limb) for limb in LIMBS) if idle else (),
         bounds=bounds,
