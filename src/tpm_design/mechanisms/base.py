@@ -78,6 +78,9 @@ class MechanismKind:
     pushes along its row of A, so that transmission indices exist; None where there is none.
     ``limb_rotation``: rows of the rotation that carries limb i to limb i + 1 where the limbs' lengths go with
     it; None where the limbs are not placed alike.
+    ``coordinates``, ``coordinate_units``: what formulas and regions take instead of the pose, where that is
+    something else (``Mechanism.coordinates``). ``tolerance_refusal``: why nothing can be proved within
+    tolerances, None where it can. ``remarks``: what a user should know besides, one sentence or two each.
     ``mode_candidates(ranges, isotropic)``: sign strings of one working mode of each set that symmetry
     makes equal for every design of the ranges; None: all modes count as different.
     """
@@ -101,11 +104,27 @@ class MechanismKind:
     transmission_drive: str | None = "motor"
     limb_rotation: Rotation | None = None
     mode_candidates: ModeCandidates | None = None
+    coordinates: tuple[str, ...] = ("x", "y", "z")
+    coordinate_units: tuple[str, ...] = ("m", "m", "m")
+    tolerance_refusal: str | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
     def translational(self) -> bool:
         """Whether poses are positions, all coordinates lengths."""
         return set(self.pose_units) == {"m"}
+
+    @property
+    def centre_names(self) -> tuple[str, ...]:
+        """The design quantities that place a region: one for each length of the pose, ``center_x`` …"""
+        return tuple(
+            f"center_{name}" for name, unit in zip(self.pose, self.pose_units, strict=True) if unit == "m"
+        )
+
+    def centre(self, design: Mapping[str, float | str]) -> tuple[float, float, float]:
+        """Coordinates of a region's centre: what no quantity of the design says is 0."""
+        x, y, z = (float(design.get(f"center_{name}", 0.0)) for name in self.pose)
+        return x, y, z
 
     def parameter(self, name: str) -> Parameter | None:
         """The parameter that ``name`` sets (``f`` or ``f2``), or None."""

@@ -154,7 +154,7 @@ def slice_fields(
     shape = (up.size, across.size)
     mechanism, mode = context.mechanism, context.mode
     reach = reach_margins(context, poses)
-    everywhere = mechanism.determinants(poses, mode)
+    everywhere = mechanism.determinants_at(poses, mode)
     conditioning = index_values(mechanism.geometry, mode.signs, index, poses)
     return Slice(
         plane=plane,

@@ -50,7 +50,7 @@ def conditioning_shown(problem: Problem) -> ConditioningShown:
 
 def has_conditioning(problem: Problem) -> bool:
     """Whether a condition number has a meaning for the mechanism."""
-    return METRICS["conditioning_min"].applies(problem.kind)
+    return METRICS["conditioning_min"].refusal(problem.kind, problem.limits) is None
 
 
 def _bound_of(goal: Goal) -> float | None:

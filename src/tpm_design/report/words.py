@@ -32,6 +32,8 @@ def options_text(goal: Goal, units: Units) -> str:
             continue
         if option.kind == "point":
             parts.append(f"{option.name} {lengths_text(value, units)}")
+        elif option.kind == "length":
+            parts.append(f"{option.name} {units.written(value, 'm')}")
         elif option.kind == "number":
             parts.append(f"{option.name} {value:g}")
         else:

@@ -75,7 +75,7 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
     else:
         variables.append(Variable("mode", "mode", values=tuple(modes)))
 
-    reader = GoalReader(known.metrics, kind, units, region is not None, quantities, faults)
+    reader = GoalReader(known.metrics, kind, units, limits, region is not None, quantities, faults)
     objectives = reader.read("objectives", model.objectives)
     constraints = reader.read("constraints", model.constraints)
     record = reader.read("record", model.record)

@@ -79,7 +79,7 @@ def _parameter(parameter: Parameter, kind: MechanismKind, free: bool) -> str:
 
 def _first(names: Sequence[str], kind: MechanismKind) -> list[str]:
     metrics = registries().metrics
-    return [name for name in names if name in metrics and metrics[name].applies(kind)]
+    return [name for name in names if name in metrics and not metrics[name].refusal(kind, {})]
 
 
 def _objective(kind: MechanismKind) -> str:
