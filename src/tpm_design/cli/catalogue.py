@@ -86,14 +86,23 @@ def _mechanism_text(kind: MechanismKind) -> str:
     drives = ", ".join(kind.drives)
     return "\n\n".join(
         [
-            f"{kind.name}: {kind.title}\nSource: {kind.source}\nPose: {', '.join(kind.pose)} (length). "
+            f"{kind.name}: {kind.title}\nSource: {kind.source}\nPose: {_pose_text(kind)}. "
             f"Actuator coordinates: {kind.limb_count}, in {kind.actuator_unit}; driven by: {drives}.",
             table(["parameter", "symbol", "unit", "must be", "limb by limb", "what it is"], parameters),
             table(["working mode", "value", "what it is"], modes),
             table(["limit", "unit", "form", "what it is"], limits),
             table(["singularity", "equation", "condition"], singularities),
+            *kind.remarks,
         ]
     )
+
+
+def _pose_text(kind: MechanismKind) -> str:
+    """``x, y, z (length)``, ``alpha (angle), beta (angle), d (length)``"""
+    words = ["length" if unit == "m" else "angle" for unit in kind.pose_units]
+    if len(set(words)) == 1:
+        return f"{', '.join(kind.pose)} ({words[0]})"
+    return ", ".join(f"{name} ({word})" for name, word in zip(kind.pose, words, strict=True))
 
 
 def _metric_text(metric: Metric) -> str:

@@ -122,8 +122,9 @@ class MechanismKind:
         )
 
     def centre(self, design: Mapping[str, float | str]) -> tuple[float, float, float]:
-        """Coordinates of a region's centre: what no quantity of the design says is 0."""
-        x, y, z = (float(design.get(f"center_{name}", 0.0)) for name in self.pose)
+        """Coordinates of a region's centre: its lengths, and 0 for every angle."""
+        names = [f"center_{name}" for name in self.pose]
+        x, y, z = (float(design[name]) if name in self.centre_names else 0.0 for name in names)
         return x, y, z
 
     def parameter(self, name: str) -> Parameter | None:

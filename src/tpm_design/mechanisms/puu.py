@@ -577,7 +577,7 @@ KIND = MechanismKind(
     ),
     determinants=("actuation", "rotation"),
     singularities=(
-        Singularity("serial", "first kind: a strut square to its rail, L_i · u_i = 0", "(30)"),
+        Singularity("serial", "first kind: a strut square to its rail, L_i · u_i = 0", "(29)"),
         Singularity("branch", "axes r_i2 and r_i5 in one line; a part of the locus of rotation", "(35)"),
         Singularity("actuation",
                     "second kind: det of unit wrenches, moments about c_0 over r, = 0", "(23), not (32)"),

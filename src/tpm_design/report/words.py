@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.problem import Goal, Problem, Variable
 from tpm_design.units import Units, si_unit
-from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere
+from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere, Tilt
 
 MOST_LISTED = 8
 
@@ -47,6 +48,22 @@ def lengths_text(values: Sequence[float], units: Units) -> str:
     return f"({numbers}) {units.name('m')}"
 
 
+def pose_text(kind: MechanismKind, pose: Sequence[float], units: Units) -> str:
+    """A pose as users write it (SI): ``(200, 100, 50) mm``, ``(alpha, beta, d) = (90 deg, 54 deg, 94 mm)``."""
+    if kind.translational:
+        return lengths_text(pose, units)
+    values = ", ".join(
+        units.written(value, unit) for value, unit in zip(pose, kind.pose_units, strict=True)
+    )
+    return f"({', '.join(kind.pose)}) = ({values})"
+
+
+def pose_unit_names(kind: MechanismKind, units: Units) -> str:
+    """``mm``, or ``deg, deg, mm`` where they differ."""
+    names = [units.name(unit) for unit in kind.pose_units]
+    return names[0] if len(set(names)) == 1 else ", ".join(names)
+
+
 def shape_text(shape: Shape, units: Units) -> str:
     """The useful region."""
     if isinstance(shape, Box):
@@ -59,6 +76,9 @@ def shape_text(shape: Shape, units: Units) -> str:
         return f"a ball of radius {units.written(shape.radius, 'm')}"
     if isinstance(shape, Ellipsoid):
         return f"an ellipsoid of half axes {lengths_text(shape.semi_axes, units)}"
+    if isinstance(shape, Tilt):
+        tilt, height = units.written(shape.tilt, "rad"), units.written(shape.height, "m")
+        return f"every tilt up to {tilt}, whichever way, over distances of {height}"
     assert isinstance(shape, Points)
     return f"{len(shape.points)} single poses"
 
@@ -67,10 +87,13 @@ def centre_text(problem: Problem, units: Units) -> str:
     """Where the region's centre is."""
     free = [v.name for v in problem.variables if v.name.startswith("center_")]
     if not free:
-        centre = [float(problem.fixed[f"center_{axis}"]) for axis in "xyz"]
+        centre = [float(problem.fixed[name]) for name in problem.kind.centre_names]
+        if len(centre) == 1:
+            name = problem.kind.centre_names[0].removeprefix("center_")
+            return f"its centre at {name} = {units.written(centre[0], 'm')}"
         return f"its centre at {lengths_text(centre, units)}"
     axes = ", ".join(name.removeprefix("center_") for name in free)
-    return "its centre free" if len(free) == 3 else f"its centre free along {axes}"
+    return "its centre free" if len(free) == len(problem.kind.centre_names) else f"its centre free along {axes}"
 
 
 def range_text(variable: Variable | None, units: Units) -> str:

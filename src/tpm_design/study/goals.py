@@ -83,9 +83,11 @@ class GoalReader:
         return Goal(metric, label, in_si, sense, minimum, maximum), plain(written)
 
     def _in_si(self, option: Option, value: Any) -> Any:
-        if option.kind == "point" and value:
-            return tuple(self._units.to_si(v, "m") for v in value)
-        return self._units.to_si(value, "m") if option.kind == "length" else value
+        if value is None or option.kind not in ("point", "length"):
+            return value
+        if option.kind == "length":
+            return self._units.to_si(value, "m")
+        return tuple(self._units.to_si(v, "m") for v in value)
 
     def _choices(self, metric: Metric, option: Option) -> tuple[str, ...]:
         """The choices there are for this mechanism: it may know one drive only."""

@@ -25,7 +25,7 @@ from tpm_design.study.model import (
 )
 from tpm_design.study.plain import plain
 from tpm_design.study.quantities import interval
-from tpm_design.study.region import read_region
+from tpm_design.study.region import check_form, read_region
 from tpm_design.study.registries import Registries, registries
 from tpm_design.study.space import free_center, read_center, read_limits, read_mode, read_parameters
 from tpm_design.study.study import Certification, OptimizerSettings, Study
@@ -51,6 +51,8 @@ def resolve(document: Document, model: StudyModel, known: Registries) -> Study:
             did_you_mean(model.mechanism.type, known.mechanisms),
         )
     region = model.region
+    if region is not None:
+        check_form(region.type, kind, faults)
     center = region.center if region else None
     parameters = read_parameters(model.mechanism, kind, units, faults)
     limits = read_limits(model.mechanism.limits, kind, units, faults)
@@ -162,6 +164,12 @@ def _tolerance(model: CertifyModel, kind: MechanismKind, units: Units, faults: F
         if kind.parameter(name) is None:
             remedy = did_you_mean(name, kind.parameter_names())
             faults.add(("certify", "tolerance", name), f"{kind.name} has no parameter {shown(name)}", remedy)
+    if kind.tolerance_refusal is not None and any(model.tolerance.values()):
+        faults.add(
+            ("certify", "tolerance"),
+            f"nothing is proved within tolerances of {kind.name}: {kind.tolerance_refusal}",
+            "Remove the tolerances.",
+        )
     found: dict[str, float] = {}
     for name in kind.parameter_names():
         parameter = kind.parameter(name)
