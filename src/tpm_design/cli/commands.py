@@ -163,10 +163,7 @@ def _print_pose(
             drive: {"value": converted(q, kind.actuator_unit), "unit": units.name(kind.actuator_unit)}
             for drive, q in values["actuators"].items()
         },
-        "jacobian": {
-            drive: by_row(matrix, rates)
-            for drive, matrix in values["jacobian"].items()
-        },
+        "jacobian": {drive: by_row(matrix, rates) for drive, matrix in values["jacobian"].items()},
         "margins": {
             name: {
                 "value": converted(value, "m" if name == "reach" else "-"),

@@ -51,7 +51,7 @@ class Mechanism(ABC):
         return (mode,)
 
     def coordinates(self, poses: FloatArray) -> FloatArray:
-        """What formulas, regions and proofs take (N, 3) for poses (N, 3) as users write them: the same, except
+        """What formulas, regions and proofs take (N, 3) for poses (N, 3) as users write them: the same, but
         where another choice makes the equations algebraic (``MechanismKind.coordinates``)."""
         return poses
 

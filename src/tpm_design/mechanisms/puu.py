@@ -2,8 +2,9 @@
 
 Source: Z. Chen, M. Li, X. Kong, C. Zhao, Kinematics analysis of a novel 2R1T 3-PUU parallel mechanism with
 multiple rotation centers, Mechanism and Machine Theory 152, 2020; equation numbers are its own. A plane s,
-the constraint plane, mirrors the platform onto a place where it never moves: the mirror image of platform joint B_i lies on rail i. With n the unit normal of s,
-l = |P P'| and β_i = (r cos φ_i, r sin φ_i, −o),
+the constraint plane, mirrors the platform onto a place where it never moves: the mirror image of platform
+joint B_i lies on rail i. With n the unit normal of s, l = |P P'| (``rise``) and
+β_i = (r cos φ_i, r sin φ_i, −o),
 
     D_i = l − 2 n·β_i,  B_i = B'_i + D_i n,  q_i = (R − r)/cos θ + D_i σ_i ∓ η_i,
     σ_i = n·u_i,  η_i² = L² − D_i² (1 − σ_i²),
@@ -77,17 +78,17 @@ def constraint_plane(geometry, a, b, d):  # type: ignore[no-untyped-def]
     raise NotImplementedError
 
 
-def limb_bearing(geometry, limb, n, l):  # type: ignore[no-untyped-def]
+def limb_bearing(geometry, limb, n, rise):  # type: ignore[no-untyped-def]
     """D_i, σ_i, √(1 − σ_i²) and η_i of one limb, see the implementation."""
     raise NotImplementedError
 
 
-def limb_carriage(geometry, limb, side, n, l):  # type: ignore[no-untyped-def]
+def limb_carriage(geometry, limb, side, n, rise):  # type: ignore[no-untyped-def]
     """Position q_i of one carriage (m), see the implementation."""
     raise NotImplementedError
 
 
-def limb_wrench(geometry, limb, side, length, n, l):  # type: ignore[no-untyped-def]
+def limb_wrench(geometry, limb, side, length, n, rise):  # type: ignore[no-untyped-def]
     """Row and b of one limb, not normalised, see the implementation."""
     raise NotImplementedError
 
@@ -98,16 +99,16 @@ def limb_wrenches(geometry, mode, length, a, b, d):  # type: ignore[no-untyped-d
 
 
 def limb_couple(geometry, limb, n):  # type: ignore[no-untyped-def]
-    """Unit row of one limb's constraint, see the implementation."""
+    """Row of one limb's constraint, see the implementation."""
     raise NotImplementedError
 
 
-def limb_swings(geometry, limb, side, n, l):  # type: ignore[no-untyped-def]
+def limb_swings(geometry, limb, side, n, rise):  # type: ignore[no-untyped-def]
     """Metres, ≥ 0 within the limit of both U joints, see the implementation."""
     raise NotImplementedError
 
 
-def limb_joints(geometry, limb, side, n, l):  # type: ignore[no-untyped-def]
+def limb_joints(geometry, limb, side, n, rise):  # type: ignore[no-untyped-def]
     """Start of the rail, slider joint and platform joint of one limb, see the implementation."""
     raise NotImplementedError
 
@@ -121,16 +122,16 @@ def _constraint_plane(geometry, a, b, d):  # type: ignore[no-untyped-def]
     n = direction_cosine(a, root(1.0 + sqr(b))), direction_cosine(b, root(1.0 + sqr(a))), cosine_of_half
     sine_of_half = root(square) * cosine_of_half
     h = geometry.height
-    l = root(sqr(d) - sqr(h * sine_of_half)) - h * cosine_of_half  # noqa: E741
-    return n, l, sine_of_half
+    rise = root(sqr(d) - sqr(h * sine_of_half)) - h * cosine_of_half
+    return n, rise, sine_of_half
 
 
 @formula(limb_bearing, PuuGeometry)
-def _limb_bearing(geometry, limb, n, l):  # type: ignore[no-untyped-def]  # noqa: E741
+def _limb_bearing(geometry, limb, n, rise):  # type: ignore[no-untyped-def]
     c, s = geometry.outward[limb]
     ux, uy, uz = geometry.rail[limb]
     nx, ny, nz = n
-    distance = l - 2.0 * (geometry.platform * (c * nx + s * ny) - geometry.offset * nz)
+    distance = rise - 2.0 * (geometry.platform * (c * nx + s * ny) - geometry.offset * nz)
     along = ux * nx + uy * ny + uz * nz
     # the cross product has no cancellation where the rail is square to s
     across = root(sqr(uy * nz - uz * ny) + sqr(uz * nx - ux * nz) + sqr(ux * ny - uy * nx))
@@ -139,19 +140,19 @@ def _limb_bearing(geometry, limb, n, l):  # type: ignore[no-untyped-def]  # noqa
 
 
 @formula(limb_carriage, PuuGeometry)
-def _limb_carriage(geometry, limb, side, n, l):  # type: ignore[no-untyped-def]  # noqa: E741
+def _limb_carriage(geometry, limb, side, n, rise):  # type: ignore[no-untyped-def]
     """Equation (20): its smaller root for side +."""
-    distance, along, _, stretch = limb_bearing(geometry, limb, n, l)
+    distance, along, _, stretch = limb_bearing(geometry, limb, n, rise)
     return geometry.meeting + distance * along - side * stretch
 
 
 @formula(limb_wrench, PuuGeometry)
-def _limb_wrench(geometry, limb, side, length, n, l):  # type: ignore[no-untyped-def]  # noqa: E741
+def _limb_wrench(geometry, limb, side, length, n, rise):  # type: ignore[no-untyped-def]
     """Equation (23), times L, for the motions there are: rotations ω about lines of s through c_0, the middle
     of P P', and the translation v along n. The row stands for length·ω + v n, so that it needs no basis of s:
     n × ((D e/2) u − (D + e σ) β)/length + (D + e σ) n, with e u + D n the strut.
     """
-    distance, along, _, stretch = limb_bearing(geometry, limb, n, l)
+    distance, along, _, stretch = limb_bearing(geometry, limb, n, rise)
     c, s = geometry.outward[limb]
     ux, uy, uz = geometry.rail[limb]
     nx, ny, nz = n
@@ -171,10 +172,10 @@ def _limb_wrench(geometry, limb, side, length, n, l):  # type: ignore[no-untyped
 @formula(limb_wrenches, PuuGeometry)
 def _limb_wrenches(geometry, mode, length, a, b, d):  # type: ignore[no-untyped-def]
     k1, k2, k3 = mode.carriages
-    n, l, _ = constraint_plane(geometry, a, b, d)  # noqa: E741
-    (x1, y1, z1), b1 = limb_wrench(geometry, 0, k1, length, n, l)
-    (x2, y2, z2), b2 = limb_wrench(geometry, 1, k2, length, n, l)
-    (x3, y3, z3), b3 = limb_wrench(geometry, 2, k3, length, n, l)
+    n, rise, _ = constraint_plane(geometry, a, b, d)
+    (x1, y1, z1), b1 = limb_wrench(geometry, 0, k1, length, n, rise)
+    (x2, y2, z2), b2 = limb_wrench(geometry, 1, k2, length, n, rise)
+    (x3, y3, z3), b3 = limb_wrench(geometry, 2, k3, length, n, rise)
     size1 = root(sqr(x1) + sqr(y1) + sqr(z1))
     size2 = root(sqr(x2) + sqr(y2) + sqr(z2))
     size3 = root(sqr(x3) + sqr(y3) + sqr(z3))
@@ -188,27 +189,23 @@ def _limb_wrenches(geometry, mode, length, a, b, d):  # type: ignore[no-untyped-
 
 @formula(limb_couple, PuuGeometry)
 def _limb_couple(geometry, limb, n):  # type: ignore[no-untyped-def]
-    """σ_i u_i + (1 − 2σ_i²) n, of length √(1 − σ_i²): in s the direction of the constraint force turned by a
-    right angle, times σ_i; along n its moment about the foot of the apex, over the distance of the two."""
+    """σ_i u_i + (1 − 2σ_i²) n, of length √(1 − σ_i²) ≤ 1: in s the constraint force along u_i × n turned by a
+    right angle, times σ_i; along n its moment about the foot of the rails' common point, over its distance.
+    Nothing is divided by σ_i, which may vanish, nor by the length, which does where limb i is singular."""
     ux, uy, uz = geometry.rail[limb]
     nx, ny, nz = n
     along = ux * nx + uy * ny + uz * nz
-    across = root(sqr(uy * nz - uz * ny) + sqr(uz * nx - ux * nz) + sqr(ux * ny - uy * nx))
     rest = 1.0 - 2.0 * sqr(along)
-    return (
-        (along * ux + rest * nx) / across,
-        (along * uy + rest * ny) / across,
-        (along * uz + rest * nz) / across,
-    )
+    return along * ux + rest * nx, along * uy + rest * ny, along * uz + rest * nz
 
 
 @formula(equations.leg_margins, PuuGeometry)
 def _leg_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """L less the distance of B_i from its rail; d − |h| sin(β/2), from where on a triangle O P' P exists."""
-    n, l, sine_of_half = constraint_plane(geometry, x, y, z)  # noqa: E741
-    distance1, _, across1, _ = limb_bearing(geometry, 0, n, l)
-    distance2, _, across2, _ = limb_bearing(geometry, 1, n, l)
-    distance3, _, across3, _ = limb_bearing(geometry, 2, n, l)
+    n, rise, sine_of_half = constraint_plane(geometry, x, y, z)
+    distance1, _, across1, _ = limb_bearing(geometry, 0, n, rise)
+    distance2, _, across2, _ = limb_bearing(geometry, 1, n, rise)
+    distance3, _, across3, _ = limb_bearing(geometry, 2, n, rise)
     length1, length2, length3 = geometry.strut
     return (
         length1 - magnitude(distance1) * across1,
@@ -219,10 +216,10 @@ def _leg_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @formula(limb_swings, PuuGeometry)
-def _limb_swings(geometry, limb, side, n, l):  # type: ignore[no-untyped-def]  # noqa: E741
+def _limb_swings(geometry, limb, side, n, rise):  # type: ignore[no-untyped-def]
     """The strut's part along the joint's first axis less L cos(limit): the rail u_i for the slider's joint,
     its mirror image 2 σ_i n − u_i for the platform's."""
-    distance, along, _, stretch = limb_bearing(geometry, limb, n, l)
+    distance, along, _, stretch = limb_bearing(geometry, limb, n, rise)
     least = geometry.strut[limb] * geometry.swing_cosine
     e = side * stretch - distance * along
     return stretch - least, side * (e * (2.0 * sqr(along) - 1.0) + distance * along) - least
@@ -232,29 +229,29 @@ def _limb_swings(geometry, limb, side, n, l):  # type: ignore[no-untyped-def]  #
 def _mode_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """Both ends of each rail, the swing of each U joint, and r (tan 60° − tan(β/2)): tilts up to 120°."""
     k1, k2, k3 = mode.carriages
-    n, l, _ = constraint_plane(geometry, x, y, z)  # noqa: E741
-    slider1, platform1 = limb_swings(geometry, 0, k1, n, l)
-    slider2, platform2 = limb_swings(geometry, 1, k2, n, l)
-    slider3, platform3 = limb_swings(geometry, 2, k3, n, l)
+    n, rise, _ = constraint_plane(geometry, x, y, z)
+    slider1, platform1 = limb_swings(geometry, 0, k1, n, rise)
+    slider2, platform2 = limb_swings(geometry, 1, k2, n, rise)
+    slider3, platform3 = limb_swings(geometry, 2, k3, n, rise)
     swings = (slider1, platform1, slider2, platform2, slider3, platform3)
     upright = geometry.platform * (STEEPEST - root(sqr(x) + sqr(y)))
     if geometry.limited == 0.0:
         return upright, upright, upright, upright, upright, upright, upright, *swings
     low, high = geometry.lowest, geometry.highest
-    q1 = limb_carriage(geometry, 0, k1, n, l)
-    q2 = limb_carriage(geometry, 1, k2, n, l)
-    q3 = limb_carriage(geometry, 2, k3, n, l)
+    q1 = limb_carriage(geometry, 0, k1, n, rise)
+    q2 = limb_carriage(geometry, 1, k2, n, rise)
+    q3 = limb_carriage(geometry, 2, k3, n, rise)
     return upright, q1 - low, high - q1, q2 - low, high - q2, q3 - low, high - q3, *swings
 
 
 @formula(equations.singularity_margins, PuuGeometry)
 def _singularity_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """Actuation: det of the unit wrenches, moments over r. Rotation: the apex's distance δ from s as
-    δ/√(δ² + r²), times det of the unit constraints; nothing is divided by σ_i, which may vanish."""
+    δ/√(δ² + r²), times det of the constraints, of rows no longer than 1."""
     (a, b, c), _ = limb_wrenches(geometry, mode, geometry.platform, x, y, z)
-    n, l, _ = constraint_plane(geometry, x, y, z)  # noqa: E741
+    n, rise, _ = constraint_plane(geometry, x, y, z)
     p, q, r = limb_couple(geometry, 0, n), limb_couple(geometry, 1, n), limb_couple(geometry, 2, n)
-    apart = 0.5 * l - geometry.apex * n[2]
+    apart = 0.5 * rise - geometry.apex * n[2]
     return (
         determinant(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]),
         direction_cosine(apart, geometry.platform)
@@ -272,10 +269,10 @@ def _unit_velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyp
 @formula(equations.serial_margins, PuuGeometry)
 def _serial_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """|L_i · u_i|: 0 where a strut is square to its rail."""
-    n, l, _ = constraint_plane(geometry, x, y, z)  # noqa: E741
-    _, _, _, stretch1 = limb_bearing(geometry, 0, n, l)
-    _, _, _, stretch2 = limb_bearing(geometry, 1, n, l)
-    _, _, _, stretch3 = limb_bearing(geometry, 2, n, l)
+    n, rise, _ = constraint_plane(geometry, x, y, z)
+    _, _, _, stretch1 = limb_bearing(geometry, 0, n, rise)
+    _, _, _, stretch2 = limb_bearing(geometry, 1, n, rise)
+    _, _, _, stretch3 = limb_bearing(geometry, 2, n, rise)
     length1, length2, length3 = geometry.strut
     return stretch1 / length1, stretch2 / length2, stretch3 / length3
 
@@ -284,18 +281,18 @@ def _serial_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
 def _actuators(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
     """q_i (m)."""
     k1, k2, k3 = mode.carriages
-    n, l, _ = constraint_plane(geometry, x, y, z)  # noqa: E741
+    n, rise, _ = constraint_plane(geometry, x, y, z)
     return (
-        limb_carriage(geometry, 0, k1, n, l),
-        limb_carriage(geometry, 1, k2, n, l),
-        limb_carriage(geometry, 2, k3, n, l),
+        limb_carriage(geometry, 0, k1, n, rise),
+        limb_carriage(geometry, 1, k2, n, rise),
+        limb_carriage(geometry, 2, k3, n, rise),
     )
 
 
 @formula(limb_joints, PuuGeometry)
-def _limb_joints(geometry, limb, side, n, l):  # type: ignore[no-untyped-def]  # noqa: E741
-    q = limb_carriage(geometry, limb, side, n, l)
-    distance, _, _, _ = limb_bearing(geometry, limb, n, l)
+def _limb_joints(geometry, limb, side, n, rise):  # type: ignore[no-untyped-def]
+    q = limb_carriage(geometry, limb, side, n, rise)
+    distance, _, _, _ = limb_bearing(geometry, limb, n, rise)
     (c, s), (ux, uy, uz), (nx, ny, nz) = geometry.outward[limb], geometry.rail[limb], n
     base, platform = geometry.base, geometry.platform
     level = geometry.height - geometry.offset
@@ -310,11 +307,11 @@ def _limb_joints(geometry, limb, side, n, l):  # type: ignore[no-untyped-def]  #
 def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """A_i, A_i + q_i u_i and B_i of each limb."""
     k1, k2, k3 = mode.carriages
-    n, l, _ = constraint_plane(geometry, x, y, z)  # noqa: E741
+    n, rise, _ = constraint_plane(geometry, x, y, z)
     return (
-        limb_joints(geometry, 0, k1, n, l),
-        limb_joints(geometry, 1, k2, n, l),
-        limb_joints(geometry, 2, k3, n, l),
+        limb_joints(geometry, 0, k1, n, rise),
+        limb_joints(geometry, 1, k2, n, rise),
+        limb_joints(geometry, 2, k3, n, rise),
     )
 
 
@@ -403,9 +400,12 @@ class Puu(Mechanism):
         alpha_rate, beta_rate = normal_rates(poses, moving)
         h, c = self.geometry.height, normal[:, 2]
         reaching = np.sqrt(np.maximum(0.0, distance**2 - h * h * (1.0 - c * c)))
-        length = (reaching - h * c)[:, None]
-        distance_rate = (reaching[:, None] * growing + length * h * moving[:, 2]) / np.where(distance > 0.0, distance, np.nan)[:, None]
-        return np.stack([alpha_rate, beta_rate, np.where(np.isnan(alpha_rate), np.nan, distance_rate)], axis=1)
+        rise = reaching - h * c
+        moved = reaching[:, None] * growing + (rise * h)[:, None] * moving[:, 2]
+        distance_rate = moved / np.where(distance > 0.0, distance, np.nan)[:, None]
+        # where α has no rate, none of the three has
+        distance_rate[np.isnan(alpha_rate)] = np.nan
+        return np.stack([alpha_rate, beta_rate, distance_rate], axis=1)
 
     def reach_radius(self) -> float:
         """|OP|: every B_i is within L of its rail."""
@@ -423,11 +423,14 @@ class Puu(Mechanism):
     def enclosed_geometry(self, tolerance: Mapping[str, float]) -> Any:
         held = {name: values[0] for name, values in enclosed_values(KIND, self.parameters, tolerance).items()}
         half_root = 0.5 * root(Interval(3.0, 3.0))
-        swing = NO_LIMIT if self.swing is None else cosine(Interval(self.swing, self.swing))
         fields: dict[str, Any] = _lengths_and_rails(
             held["R"], held["r"], held["o"], enclosed_cosine_sine(self.parameters["theta"][0]), half_root
         )
-        return self.geometry._replace(strut=(held["L"],) * 3, swing_cosine=swing + Interval(0.0, 0.0), **fields)
+        fields["strut"] = (held["L"],) * 3
+        fields["swing_cosine"] = (
+            Interval(NO_LIMIT, NO_LIMIT) if self.swing is None else cosine(Interval(self.swing, self.swing))
+        )
+        return self.geometry._replace(**fields)
 
     def assemblies(
         self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor"
@@ -536,7 +539,7 @@ REMARKS = (
     "Its condition of the second kind, b_i × L_i = 0, is not the one: `actuation` is the determinant of the "
     "carriages' speeds against the three motions there are.",
     "There are singularities inside the workspace that it claims: for θ = 45° the `rotation` locus at "
-    "β = 67.38° towards α = 90° and 74.15° towards α = 0°, whatever d and L.",
+    "β = 67.38° towards α = 90° and 74.17° towards α = 0°, whatever d and L.",
     "Poses with β = 0 have no α: give any; the Jacobian does not exist there. Tilts up to 120° are "
     "considered. Where d < h two poses share (α, β, d): the one with l + h cos(β/2) ≥ 0 is meant.",
     "κ compares rotations with a translation: it needs the limit characteristic_length.",
@@ -577,12 +580,13 @@ KIND = MechanismKind(
     ),
     determinants=("actuation", "rotation"),
     singularities=(
-        Singularity("serial", "first kind: a strut square to its rail, L_i · u_i = 0", "(29)"),
-        Singularity("branch", "axes r_i2 and r_i5 in one line; a part of the locus of rotation", "(35)"),
-        Singularity("actuation",
-                    "second kind: det of unit wrenches, moments about c_0 over r, = 0", "(23), not (32)"),
-        Singularity("rotation", "constraint: free to turn about n, the apex in s or det of the "
-                    "division-free constraints = 0", "section 5"),
+        Singularity("serial", "a strut square to its rail, L_i · u_i = 0: first kind", "(29)"),
+        Singularity("branch", "axes r_i2 and r_i5 of a limb in one line: part of the locus of rotation",
+                    "(35)"),
+        Singularity("actuation", "det of unit wrenches, moments about c_0 over r, = 0: second kind, "
+                    "uncontrolled with carriages locked", "(23)"),
+        Singularity("rotation", "det of the constraints = 0, or the rails' common point in s: constraint "
+                    "singularity, free to turn about n", "(5), (12)"),
     ),
     example=MappingProxyType({"R": 0.12, "r": 0.05, "theta": math.radians(45.0), "L": 0.062, "o": 0.0082843}),
     build=build,

@@ -19,7 +19,8 @@ class Option:
     """One option of a metric.
 
     ``kind``: "choice" (one of ``choices``), "number" (within ``minimum``..``maximum``, no unit), "length" (a
-    positive length) or "point" (three lengths), lengths in the study's unit and handed on in metres. ``default`` None: not given.
+    positive length) or "point" (three lengths), in the study's unit and handed on in metres.
+    ``default`` None: not given.
     """
 
     name: str
@@ -70,7 +71,8 @@ def of_positions(kind: MechanismKind, limits: Mapping[str, Any]) -> str | None:
 class Metric:
     """One figure of merit. ``scale`` (in the metric's SI unit) makes its violation dimensionless. ``notes``:
     names of the notes its measurements may carry. ``refusal(kind, limits)``: why it means nothing for a
-    mechanism with these limits, None where it does; ``drives``: those of the mechanism's drives for which it does, the usual one first."""
+    mechanism with these limits, None where it does; ``drives``: those of the mechanism's drives for which it
+    does, the usual one first."""
 
     name: str
     unit: str

@@ -60,12 +60,13 @@ class _Frame:
 
     def factors(self, plane: Plane) -> FloatArray:
         """From SI to the study's units, of the coordinates across and up (2,)."""
-        units = self.kind.coordinate_units
-        return np.array([self.units.from_si(1.0, units[plane.across]), self.units.from_si(1.0, units[plane.up])])
+        units = [self.kind.coordinate_units[side] for side in (plane.across, plane.up)]
+        return np.array([self.units.from_si(1.0, unit) for unit in units])
 
     def axis_name(self, coordinate: int) -> str:
         """``x [mm]``; a name alone where there is no unit."""
-        name, unit = self.kind.coordinates[coordinate], self.units.name(self.kind.coordinate_units[coordinate])
+        name = self.kind.coordinates[coordinate]
+        unit = self.units.name(self.kind.coordinate_units[coordinate])
         return name if unit == "-" else f"{name} [{unit}]"
 
     @property

@@ -49,12 +49,10 @@ def lengths_text(values: Sequence[float], units: Units) -> str:
 
 
 def pose_text(kind: MechanismKind, pose: Sequence[float], units: Units) -> str:
-    """A pose as users write it (SI): ``(200, 100, 50) mm``, ``(alpha, beta, d) = (90 deg, 54 deg, 94 mm)``."""
+    """A pose as users write it: ``(200, 100, 50) mm``, ``(alpha, beta, d) = (90 deg, 54 deg, 94 mm)``."""
     if kind.translational:
         return lengths_text(pose, units)
-    values = ", ".join(
-        units.written(value, unit) for value, unit in zip(pose, kind.pose_units, strict=True)
-    )
+    values = ", ".join(units.written(value, unit) for value, unit in zip(pose, kind.pose_units, strict=True))
     return f"({', '.join(kind.pose)}) = ({values})"
 
 
@@ -93,7 +91,9 @@ def centre_text(problem: Problem, units: Units) -> str:
             return f"its centre at {name} = {units.written(centre[0], 'm')}"
         return f"its centre at {lengths_text(centre, units)}"
     axes = ", ".join(name.removeprefix("center_") for name in free)
-    return "its centre free" if len(free) == len(problem.kind.centre_names) else f"its centre free along {axes}"
+    return (
+        "its centre free" if len(free) == len(problem.kind.centre_names) else f"its centre free along {axes}"
+    )
 
 
 def range_text(variable: Variable | None, units: Units) -> str:

@@ -49,7 +49,11 @@ Sweep = GridSweep | ListSweep | SampleSweep
 def design_names(problem: Problem) -> list[str]:
     """Every design quantity in order: parameters, centre, mode."""
     given = {*problem.fixed, *(variable.name for variable in problem.variables)}
-    return [name for name in (*problem.kind.parameter_names(), *problem.kind.centre_names, "mode") if name in given]
+    return [
+        name
+        for name in (*problem.kind.parameter_names(), *problem.kind.centre_names, "mode")
+        if name in given
+    ]
 
 
 def design_value(name: str, value: float | str, problem: Problem, units: Units) -> float | str:

@@ -1,7 +1,7 @@
 """How far a platform tilts in every direction, at one distance, before something stops it.
 
-In coordinates (a, b, d) of ``mechanisms/tilts.py`` a direction of tilt is a ray from (0, 0, d). Along each the
-first pose out of the workspace, or beyond a singularity, is bracketed on samples and bisected.
+In coordinates (a, b, d) of ``mechanisms/tilts.py`` a direction of tilt is a ray from (0, 0, d). Along each
+the first pose out of the workspace, or beyond a singularity, is bracketed on samples and bisected.
 """
 
 from __future__ import annotations
