@@ -587,9 +587,9 @@ def test_each_fault_is_told_with_its_line_and_remedy(
 
 def test_a_metric_without_meaning_for_the_mechanism(tmp_path: Path) -> None:
     known = registries()
-    limited = replace(known.metrics["coverage"], applies=lambda kind: kind.name != "uru")
+    limited = replace(known.metrics["coverage"], refusal=lambda kind, limits: f"none for {kind.name}")
     document = read_document(written(tmp_path, GOOD))
-    with pytest.raises(StudyError, match="coverage has no meaning for the mechanism uru") as caught:
+    with pytest.raises(StudyError, match="coverage has no meaning here: none for uru") as caught:
         resolve(document, parse(document), replace(known, metrics={**known.metrics, "coverage": limited}))
     assert caught.value.where == f"{document.path}:18"
     assert "total_link_length" in (caught.value.remedy or "")

@@ -179,8 +179,7 @@ def design_context(problem: Problem, design: Design) -> Context:
     mode = mechanism.mode_of(problem.modes[str(design["mode"])])
     region = None
     if problem.region is not None:
-        centre = (float(design[CENTRE[0]]), float(design[CENTRE[1]]), float(design[CENTRE[2]]))
-        region = place(problem.region, centre)
+        region = place(problem.region, problem.kind.centre(design))
     return Context(mechanism, mode, region, problem.accuracy.volume, problem.accuracy.region_samples)
 
 

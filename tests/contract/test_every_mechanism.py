@@ -26,19 +26,32 @@ def parameter_of(kind: MechanismKind, name: str) -> Parameter:
     return found
 
 
+def random_poses(mechanism: Mechanism, random: np.random.Generator, count: int) -> np.ndarray:
+    """Poses in a box around all that the mechanism reaches."""
+    half = np.asarray(mechanism.reach_half_axes())
+    return mechanism.poses(random.uniform(-half, half, (count, 3)))
+
+
+def unit_steps(mechanism: Mechanism) -> np.ndarray:
+    """Rows: one coordinate of the pose alone, by the reach radius where it is a length, by 1 rad else."""
+    radius = mechanism.reach_radius()
+    return np.diag([radius if unit == "m" else 1.0 for unit in mechanism.kind.pose_units])
+
+
 def sample_poses(mechanism: Mechanism, mode: Mode, count: int) -> np.ndarray:
     """Poses well inside the mode's workspace, seeded."""
     random = np.random.default_rng(5)
     radius = mechanism.reach_radius()
-    poses = random.uniform(-radius, radius, (20000, 3))
+    poses = random_poses(mechanism, random, 20000)
     margins = mechanism.margins(poses, mode)
     inside = margins["reach"] > 0.05 * radius
     for name in mechanism.kind.determinants:
         inside &= np.abs(np.nan_to_num(margins[name])) > 0.05
     poses = poses[inside]
-    for step in np.vstack([np.eye(3), -np.eye(3)]):
+    steps = 0.01 * unit_steps(mechanism)
+    for step in np.vstack([steps, -steps]):
         # off the ends of the joints' ranges as well
-        poses = poses[~np.isnan(mechanism.ik(poses + 0.01 * radius * step, mode)[:, 0])]
+        poses = poses[~np.isnan(mechanism.ik(poses + step, mode)[:, 0])]
     return poses[:count]
 
 
@@ -78,15 +91,11 @@ def test_jacobian_is_the_derivative_of_the_inverse_map(machine: Mechanism, drive
     jacobians = machine.jacobian(poses, mode, drive=drive)
     errors = []
     for step in (1e-3, 5e-4):
-        h = step * machine.reach_radius()
         slopes = np.stack(
             [
-                (
-                    machine.ik(poses + h * axis, mode, drive=drive)
-                    - machine.ik(poses - h * axis, mode, drive=drive)
-                )
-                / (2.0 * h)
-                for axis in np.eye(3)
+                (machine.ik(poses + h, mode, drive=drive) - machine.ik(poses - h, mode, drive=drive))
+                / (2.0 * h.sum())
+                for h in step * unit_steps(machine)
             ],
             axis=-1,
         )
@@ -100,8 +109,9 @@ def test_jacobian_is_the_derivative_of_the_inverse_map(machine: Mechanism, drive
 def test_margins_keep_their_promises(machine: Mechanism) -> None:
     mode = first_mode(machine)
     random = np.random.default_rng(6)
-    radius = machine.reach_radius()
-    poses = random.uniform(-1.3 * radius, 1.3 * radius, (5000, 3))
+    half = np.asarray(machine.reach_half_axes())
+    coordinates = random.uniform(-1.3 * half, 1.3 * half, (5000, 3))
+    poses = machine.poses(coordinates)
     margins = machine.margins(poses, mode)
     inside = margins["reach"] >= 0.0
     assert 0 < inside.sum() < len(poses)
@@ -109,7 +119,11 @@ def test_margins_keep_their_promises(machine: Mechanism) -> None:
     for name in ("serial", *machine.kind.determinants):
         assert np.isnan(margins[name][~inside]).all()
         assert (np.abs(margins[name][inside]) <= 1.0 + 1e-12).all()
-    assert (np.linalg.norm(poses[inside], axis=1) <= radius).all()
+    assert (np.linalg.norm(coordinates[inside] / half, axis=1) <= 1.0).all()
+    lengths = [unit == "m" for unit in machine.kind.pose_units]
+    assert (np.linalg.norm(poses[inside][:, lengths], axis=1) <= machine.reach_radius()).all()
+    back = machine.coordinates(poses)
+    assert np.allclose(back, coordinates, rtol=1e-12, atol=1e-12)
 
 
 def test_scale_changes_lengths_and_nothing_else(kind: MechanismKind, machine: Mechanism) -> None:
@@ -122,12 +136,14 @@ def test_scale_changes_lengths_and_nothing_else(kind: MechanismKind, machine: Me
     )
     mode = first_mode(machine)
     poses = sample_poses(machine, mode, 50)
-    small, large = machine.margins(poses, mode), scaled.margins(3.0 * poses, mode)
+    larger = np.array([3.0 if unit == "m" else 1.0 for unit in kind.pose_units])
+    small, large = machine.margins(poses, mode), scaled.margins(larger * poses, mode)
     assert np.allclose(large["reach"], 3.0 * small["reach"], rtol=1e-12)
     for name in ("serial", *kind.determinants):
         assert np.allclose(large[name], small[name], atol=1e-12)
-    factor = 1.0 if kind.actuator_unit == "m" else 3.0
-    assert np.allclose(scaled.jacobian(3.0 * poses, mode), factor * machine.jacobian(poses, mode), rtol=1e-9)
+    rates = (larger / (3.0 if kind.actuator_unit == "m" else 1.0))[:, None]
+    found, expected = scaled.jacobian(larger * poses, mode), rates * machine.jacobian(poses, mode)
+    assert np.allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
 
 
 def test_limbs_may_change_places(kind: MechanismKind) -> None:

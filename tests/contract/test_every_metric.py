@@ -15,7 +15,7 @@ from tpm_design.metrics import METRICS
 from tpm_design.metrics.base import UNDEFINED, Metric
 from tpm_design.problem import Design, Evaluation, Goal, Problem, design_context, evaluate
 from tpm_design.units import Units, unit_for
-from tpm_design.workspace.regions import Box
+from tpm_design.workspace.regions import Box, Tilt
 
 FAR = 10.0
 
@@ -24,44 +24,55 @@ def goal_of(metric: Metric, kind: MechanismKind) -> Goal:
     options: dict[str, Any] = {
         option.name: 0.5 * (option.minimum + option.maximum) for option in metric.options if option.required
     }
+    if metric.option("distance"):
+        options["distance"] = float(good_centre(kind.name)[2])
     if metric.option("drive"):
         options["drive"] = metric.drives(kind)[0]
     return Goal(metric, metric.name, options)
 
 
 def meaningful(kind: MechanismKind) -> list[Metric]:
-    return [metric for metric in METRICS.values() if metric.applies(kind)]
+    return [metric for metric in METRICS.values() if metric.refusal(kind, limits_of(kind)) is None]
+
+
+def limits_of(kind: MechanismKind) -> dict[str, Any]:
+    """The limits without which metrics are refused."""
+    radius = kind.build(kind.example, {}).reach_radius()
+    return {limit.name: 0.2 * radius for limit in kind.limits if limit.name == "characteristic_length"}
 
 
 def problem_of(kind: MechanismKind, *goals: Goal, constraints: tuple[Goal, ...] = ()) -> Problem:
     modes = {"+": {field.name: "+" * field.length for field in kind.mode_fields}}
     edge = 0.06 * kind.build(kind.example, {}).reach_radius()
-    return Problem(kind, {}, (), modes, {}, Box((edge, edge, edge)), (), constraints, goals)
+    region = Box((edge, edge, edge)) if kind.translational else Tilt(0.2, edge)
+    return Problem(kind, {}, (), modes, limits_of(kind), region, (), constraints, goals)
 
 
 @cache
 def good_centre(kind_name: str) -> np.ndarray:
-    """A pose of the example well within reach and far from singularities, seeded."""
+    """Coordinates of a pose of the example well within reach and far from singularities, upright where
+    platforms tilt, seeded."""
     kind = MECHANISMS[kind_name]
     machine = kind.build(kind.example, {})
     mode = machine.mode_of({field.name: "+" * field.length for field in kind.mode_fields})
     radius = machine.reach_radius()
     poses = np.random.default_rng(3).uniform(-radius, radius, (20000, 3))
-    margins = machine.margins(poses, mode)
+    poses[:, [unit != "m" for unit in kind.pose_units]] = 0.0
+    margins = machine.margins_at(poses, mode)
     scores = [margins["reach"] / radius, margins["serial"]]
     scores += [np.abs(margins[name]) for name in kind.determinants]
     around = [
-        machine.ik(poses + 0.05 * radius * step, mode)[:, 0] for step in np.vstack([np.eye(3), -np.eye(3)])
+        machine.margins_at(poses + 0.05 * radius * step, mode)["reach"] < 0.0
+        for step in np.vstack([np.eye(3), -np.eye(3)])
     ]
-    worst = np.where(
-        np.isnan(around).any(axis=0), -np.inf, np.nan_to_num(np.min(scores, axis=0), nan=-np.inf)
-    )
+    worst = np.where(np.any(around, axis=0), -np.inf, np.nan_to_num(np.min(scores, axis=0), nan=-np.inf))
     return np.asarray(poses[worst.argmax()])
 
 
 def design_at(kind: MechanismKind, factor: float) -> Design:
-    x, y, z = (float(value) for value in factor * good_centre(kind.name))
-    return {**kind.example, "center_x": x, "center_y": y, "center_z": z, "mode": "+"}
+    centre = zip(kind.pose, factor * good_centre(kind.name), strict=True)
+    placed = {f"center_{name}": float(value) for name, value in centre}
+    return {**kind.example, **{name: placed[name] for name in kind.centre_names}, "mode": "+"}
 
 
 @pytest.fixture(

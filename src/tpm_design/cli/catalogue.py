@@ -137,6 +137,8 @@ def _values(option: Option) -> str:
         return " | ".join(option.choices)
     if option.kind == "point":
         return "[x, y, z] (length)"
+    if option.kind == "length":
+        return "length"
     if math.isfinite(option.minimum) and math.isfinite(option.maximum):
         return f"{option.minimum:g} … {option.maximum:g}"
     return "number"

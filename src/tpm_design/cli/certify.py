@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tpm_design.certificates.document import FILE, document, write_document
 from tpm_design.certificates.tolerances import LargestTolerance, largest_tolerance
 from tpm_design.certificates.verdict import Requirement, Verdict, verdict
@@ -20,7 +22,7 @@ from tpm_design.cli.results import design_rows
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
 from tpm_design.problem import Design, Evaluation
-from tpm_design.report.words import asked, lengths_text
+from tpm_design.report.words import asked, pose_text, pose_unit_names
 from tpm_design.runs.tables import goal_unit
 from tpm_design.study import Study
 from tpm_design.study.study import Certification
@@ -94,7 +96,7 @@ def _design_rows(study: Study, design: Design) -> list[list[str]]:
 
 def verdict_text(study: Study, found: Verdict) -> str:
     """A verdict as a table and one sentence, in the study's units."""
-    rows = [_requirement_row(study, requirement) for requirement in found.requirements]
+    rows = [_requirement_row(study, found, requirement) for requirement in found.requirements]
     heads = ["requirement", "asked", "verdict", "proved to spare", "worst found", "why"]
     effort = f"{found.boxes} boxes, {found.seconds:.2g} s"
     sentences = {
@@ -131,16 +133,26 @@ def tolerance_text(study: Study, found: Verdict, factor: float = 1.0) -> str:
     return ", ".join(parts)
 
 
-def _requirement_row(study: Study, requirement: Requirement) -> list[str]:
+def _user_pose(found: Verdict, coordinates: Sequence[float]) -> list[float]:
+    """A pose as users write it (SI)."""
+    values = found.context.mechanism.poses(np.array([coordinates]))[0]
+    return [float(value) for value in values]
+
+
+def _pose_text(study: Study, found: Verdict, coordinates: Sequence[float]) -> str:
+    return pose_text(study.problem.kind, _user_pose(found, coordinates), study.units)
+
+
+def _requirement_row(study: Study, found: Verdict, requirement: Requirement) -> list[str]:
     goal = requirement.goal
     unit = goal_unit(study.problem, goal)
     spare = "" if requirement.slack is None else study.units.written(requirement.slack, unit, digits=3)
     why = requirement.reason
     if requirement.breaking is not None and requirement.breaking.pose is not None:
-        why = f"broken at {lengths_text(requirement.breaking.pose, study.units)}: {why}"
+        why = f"broken at {_pose_text(study, found, requirement.breaking.pose)}: {why}"
     if requirement.open_box is not None:
         middle = [0.5 * (low + high) for low, high in requirement.open_box]
-        why = f"not proved around {lengths_text(middle, study.units)}: {why}"
+        why = f"not proved around {_pose_text(study, found, middle)}: {why}"
     return [
         goal.label,
         asked(goal, study.units, unit),
@@ -175,8 +187,10 @@ def verdict_data(study: Study, found: Verdict) -> dict[str, Any]:
         if requirement.worst is not None and math.isfinite(requirement.worst):
             data["worst_found"] = study.units.from_si(requirement.worst, unit)
         if requirement.breaking is not None and requirement.breaking.pose is not None:
-            data["pose"] = [study.units.from_si(value, "m") for value in requirement.breaking.pose]
-            data["pose_unit"] = study.units.name("m")
+            pose = _user_pose(found, requirement.breaking.pose)
+            kind = study.problem.kind
+            data["pose"] = [study.units.from_si(v, u) for v, u in zip(pose, kind.pose_units, strict=True)]
+            data["pose_unit"] = pose_unit_names(kind, study.units)
         requirements[requirement.goal.label] = data
     return {
         "study": study.name,

@@ -18,6 +18,7 @@ from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
 from tpm_design.mechanisms import mechanism_kind
 from tpm_design.problem import Design, evaluate, with_ties
+from tpm_design.report.words import pose_text, pose_unit_names
 from tpm_design.runs.folder import STUDY, newest_run, read_run
 from tpm_design.runs.optimize import check_plan
 from tpm_design.runs.search import best_entry
@@ -31,7 +32,6 @@ from tpm_design.study import (
     template,
 )
 from tpm_design.study.actions import Run, optimize_study, plan_of, pose_values
-from tpm_design.units import unit_for
 
 RESULTS = Path("results")
 SWITCH_INTERVAL = 1e-4
@@ -143,15 +143,18 @@ def _settings(texts: Sequence[str]) -> dict[str, str]:
 
 
 def _pose(study: Study, text: str) -> tuple[float, float, float]:
+    kind = study.problem.kind
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
         numbers = []
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
         raise UsageError(
-            f"{text!r} is not a pose.", where="--at", remedy=f"Write --at x,y,z in {study.units.length}."
+            f"{text!r} is not a pose.",
+            where="--at",
+            remedy=f"Write --at {','.join(kind.pose)} in {pose_unit_names(kind, study.units)}.",
         )
-    x, y, z = (study.units.to_si(number, "m") for number in numbers)
+    x, y, z = (study.units.to_si(value, unit) for value, unit in zip(numbers, kind.pose_units, strict=True))
     return x, y, z
 
 
@@ -160,23 +163,28 @@ def _print_pose(
 ) -> int | None:
     units, kind = study.units, study.problem.kind
     values = pose_values(study, design, pose)
-    rate = unit_for("m/rad or -", kind.actuator_unit)
+    rates = [f"{unit}/{kind.actuator_unit}" for unit in kind.pose_units]
 
     def converted(array: Any, unit: str) -> Any:
         if isinstance(array, list):
             return [converted(item, unit) for item in array]
         return None if array is None else units.from_si(array, unit)
 
+    def by_row(rows: Sequence[Any], si_units: Sequence[str]) -> dict[str, Any]:
+        """Values with the unit of each row, one unit where all have it."""
+        names = [units.name(unit) for unit in si_units]
+        return {
+            "value": [converted(row, unit) for row, unit in zip(rows, si_units, strict=True)],
+            "unit": names[0] if len(set(names)) == 1 else names,
+        }
+
     data = {
-        "pose": {"value": converted(list(pose), "m"), "unit": units.name("m")},
+        "pose": by_row(pose, kind.pose_units),
         "actuators": {
             drive: {"value": converted(q, kind.actuator_unit), "unit": units.name(kind.actuator_unit)}
             for drive, q in values["actuators"].items()
         },
-        "jacobian": {
-            drive: {"value": converted(matrix, rate), "unit": units.name(rate)}
-            for drive, matrix in values["jacobian"].items()
-        },
+        "jacobian": {drive: by_row(matrix, rates) for drive, matrix in values["jacobian"].items()},
         "margins": {
             name: {
                 "value": converted(value, "m" if name == "reach" else "-"),
@@ -193,11 +201,11 @@ def _print_pose(
     for drive, entry in data["actuators"].items():
         rows.append([f"{drive} coordinates [{entry['unit']}]", _row_text(entry["value"])])
     for drive, entry in data["jacobian"].items():
-        for axis, row in zip(kind.pose, entry["value"], strict=True):
-            rows.append([f"Jacobian of the {drive}s, {axis} [{entry['unit']}]", _row_text(row)])
+        for axis, unit, row in zip(kind.pose, rates, entry["value"], strict=True):
+            rows.append([f"Jacobian of the {drive}s, {axis} [{units.name(unit)}]", _row_text(row)])
     for name, entry in data["margins"].items():
         rows.append([f"margin: {name} [{entry['unit']}]", _row_text([entry["value"]])])
-    print("\n" + table([f"at {_row_text(data['pose']['value'])} {units.length}", "value"], rows))
+    print("\n" + table([f"at {pose_text(kind, pose, units)}", "value"], rows))
     if values["actuators"][kind.drives[0]][0] is None:
         print("\nThis pose is not reachable in the working mode.")
     return None

@@ -42,7 +42,7 @@ def comparison_text(studies: Mapping[str, Study], runs: Mapping[str, Run]) -> st
     names = list(
         dict.fromkeys(name for label in runs for name in studies[label].problem.kind.parameter_names())
     )
-    names += ["center_x", "center_y", "center_z"]
+    names += list(dict.fromkeys(n for label in runs for n in studies[label].problem.kind.centre_names))
     for name in names:
         cells = [_quantity(studies[label], run, name) for label, run in runs.items()]
         if any(cells):

@@ -105,9 +105,11 @@ class MechanismKind:
     pushes along its row of A, so that transmission indices exist; None where there is none.
     ``limb_rotation``: rows of the rotation that carries limb i to limb i + 1 where the limbs' lengths go with
     it; None where the limbs are not placed alike.
+    ``coordinates``, ``coordinate_units``: what formulas and regions take instead of the pose, where that is
+    something else (``Mechanism.coordinates``). ``tolerance_refusal``: why nothing can be proved within
+    tolerances, None where it can. ``remarks``: what a user should know besides, one sentence or two each.
     ``mode_candidates(ranges, isotropic)``: sign strings of one working mode of each set that symmetry
     makes equal for every design of the ranges; None: all modes count as different.
-    ``remarks``: what a user should know besides, one sentence or more each.
     """
 
     name: str
@@ -131,11 +133,27 @@ class MechanismKind:
     mode_candidates: ModeCandidates | None = None
     remarks: tuple[str, ...] = ()
     drawing: Drawing = Drawing()
+    coordinates: tuple[str, ...] = ("x", "y", "z")
+    coordinate_units: tuple[str, ...] = ("m", "m", "m")
+    tolerance_refusal: str | None = None
 
     @property
     def translational(self) -> bool:
         """Whether poses are positions, all coordinates lengths."""
         return set(self.pose_units) == {"m"}
+
+    @property
+    def centre_names(self) -> tuple[str, ...]:
+        """The design quantities that place a region: one for each length of the pose, ``center_x`` …"""
+        return tuple(
+            f"center_{name}" for name, unit in zip(self.pose, self.pose_units, strict=True) if unit == "m"
+        )
+
+    def centre(self, design: Mapping[str, float | str]) -> tuple[float, float, float]:
+        """Coordinates of a region's centre: its lengths, and 0 for every angle."""
+        names = [f"center_{name}" for name in self.pose]
+        x, y, z = (float(design[name]) if name in self.centre_names else 0.0 for name in names)
+        return x, y, z
 
     def parameter(self, name: str) -> Parameter | None:
         """The parameter that ``name`` sets (``f`` or ``f2``), or None."""

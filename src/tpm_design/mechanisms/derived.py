@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from tpm_design.arithmetic import derived
 from tpm_design.arithmetic.algebra import determinant
 from tpm_design.mechanisms import equations
@@ -34,3 +36,9 @@ def _limb_clearance(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     first, second, third = equations.joint_centres(geometry, mode, x, y, z)
     least = min(chain_distance(first, second), chain_distance(second, third), chain_distance(third, first))
     return least - 2.0 * geometry.link_radius
+
+
+@derived(equations.length_error_gains)
+def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """There are none where poses are not positions: metrics of them are refused."""
+    return math.nan, math.nan, math.nan

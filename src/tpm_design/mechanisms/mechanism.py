@@ -57,9 +57,28 @@ class Mechanism(ABC):
         """Modes that make up ``mode`` between planes that no aspect crosses; itself where there are none."""
         return (mode,)
 
+    def coordinates(self, poses: FloatArray) -> FloatArray:
+        """What formulas, regions and proofs take (N, 3) for poses (N, 3) as users write them: the same, but
+        where another choice makes the equations algebraic (``MechanismKind.coordinates``)."""
+        return poses
+
+    def poses(self, coordinates: FloatArray) -> FloatArray:
+        """Poses (N, 3) as users write them; the inverse of ``coordinates``."""
+        return coordinates
+
+    def pose_rates(self, poses: FloatArray, rates: FloatArray) -> FloatArray:
+        """Rates of the poses (N, 3, 3) from those that ``equations.velocity_map`` speaks of, at ``poses`` as
+        users write them."""
+        return rates
+
     @abstractmethod
     def reach_radius(self) -> float:
-        """Every reachable pose lies within this distance (m) of the origin."""
+        """The platform's point lies within this distance (m) of the origin at every reachable pose."""
+
+    def reach_half_axes(self) -> tuple[float, float, float]:
+        """Half axes of an ellipsoid about the origin that holds the coordinates of every reachable pose."""
+        radius = self.reach_radius()
+        return radius, radius, radius
 
     def fold_lines(self) -> tuple[FoldLine, ...]:
         """Lines of folded limbs that no region may hold in its interior; none where reach bounds all of them
@@ -73,7 +92,9 @@ class Mechanism(ABC):
 
     def total_link_length(self) -> float:
         """Sum over the limbs of the moving links (m)."""
-        return sum(sum(self.parameters[p.name]) for p in self.kind.parameters if p.moving_link)
+        lengths = [self.parameters[p.name] for p in self.kind.parameters if p.moving_link]
+        # a length for all limbs is there once
+        return sum(sum(per_limb) * (self.kind.limb_count // len(per_limb)) for per_limb in lengths)
 
     def enclosed_link_length(self, tolerance: Mapping[str, float]) -> Interval:
         """Bounds (m) of ``total_link_length`` for every machine within ``tolerance``."""
@@ -81,8 +102,9 @@ class Mechanism(ABC):
         total = Interval(0.0, 0.0)
         for parameter in self.kind.parameters:
             if parameter.moving_link:
-                for length in values[parameter.name]:
-                    total = total + length
+                for limb in range(self.kind.limb_count):
+                    lengths = values[parameter.name]
+                    total = total + lengths[limb % len(lengths)]
         return total
 
     @abstractmethod
@@ -93,7 +115,7 @@ class Mechanism(ABC):
         is proved to hold it alone, or with the box where that proof fails."""
 
     def fk(self, q: ArrayLike, mode: Mode | None = None, *, drive: str = "motor") -> FloatArray:
-        """Every real assembly (K, 3) in metres for actuator coordinates ``q`` (3,), of all working modes
+        """Every real assembly (K, 3), in SI, for actuator coordinates ``q`` (3,), of all working modes
         or of ``mode``, each confirmed by the inverse map; (0, 3) if there is none. ``drive`` as in ``ik``.
 
         Raises ParameterError on an unknown ``drive``, on anything but three finite numbers, and where
@@ -103,12 +125,12 @@ class Mechanism(ABC):
         return np.array([assembly.pose for assembly in found]).reshape(-1, 3)
 
     def ik(self, points: ArrayLike, mode: Mode, *, drive: str = "motor") -> FloatArray:
-        """Actuator coordinates (N, n) at ``points`` (N, 3) in metres; rows of NaN where the pose is
+        """Actuator coordinates (N, n) at ``points`` (N, 3), in SI; rows of NaN where the pose is
         unreachable, outside the mode's octant or joint limits, or the coordinates are undefined.
 
         Raises ParameterError on an unknown ``drive`` or points that are not (N, 3) finite numbers.
         """
-        x, y, z = pointwise.columns(_poses(points))
+        x, y, z = pointwise.columns(self.coordinates(_poses(points)))
         out = np.empty((x.size, 3))
         pointwise.actuators_row(self.geometry, mode.signs, self.motor_weight(drive), x, y, z, out)
         out[~self._usable(x, y, z, mode) | ~np.isfinite(out).all(axis=1)] = np.nan
@@ -119,11 +141,12 @@ class Mechanism(ABC):
 
         Raises ParameterError as ``ik`` does.
         """
-        x, y, z = pointwise.columns(_poses(points))
+        poses = _poses(points)
+        x, y, z = pointwise.columns(self.coordinates(poses))
         out = np.empty((x.size, 3, 3))
         pointwise.jacobian_row(self.geometry, mode.signs, self.motor_weight(drive), x, y, z, out)
         out[~self._usable(x, y, z, mode) | ~np.isfinite(out).all(axis=(1, 2))] = np.nan
-        return out
+        return self.pose_rates(poses, out)
 
     def margins(self, points: ArrayLike, mode: Mode) -> dict[str, FloatArray]:
         """Margins (N,) at ``points`` (N, 3).
@@ -132,7 +155,11 @@ class Mechanism(ABC):
         octant or the joint limits the negative distance to them where that is worse). "serial" and the
         signed determinants of unit rows: NaN where unreachable, 0 where their rows are undefined.
         """
-        x, y, z = pointwise.columns(_poses(points))
+        return self.margins_at(self.coordinates(_poses(points)), mode)
+
+    def margins_at(self, coordinates: FloatArray, mode: Mode) -> dict[str, FloatArray]:
+        """``margins`` at coordinates (N, 3)."""
+        x, y, z = pointwise.columns(coordinates)
         legs, side, determinants = self._margins(x, y, z, mode)
         reach = np.where(side < 0.0, np.minimum(legs, side), legs)
         reach[np.isnan(legs) | np.isnan(side)] = 0.0
@@ -148,7 +175,11 @@ class Mechanism(ABC):
 
     def determinants(self, points: ArrayLike, mode: Mode) -> FloatArray:
         """Signed determinants (D, N) at ``points`` (N, 3), reachable or not; 0 where undefined."""
-        x, y, z = pointwise.columns(_poses(points))
+        return self.determinants_at(self.coordinates(_poses(points)), mode)
+
+    def determinants_at(self, coordinates: FloatArray, mode: Mode) -> FloatArray:
+        """``determinants`` at coordinates (N, 3)."""
+        x, y, z = pointwise.columns(coordinates)
         out = np.empty((len(self.kind.determinants), x.size))
         pointwise.singularity_row(self.geometry, mode.signs, x, y, z, out)
         out[np.isnan(out)] = 0.0
@@ -156,7 +187,7 @@ class Mechanism(ABC):
 
     def joint_centres(self, pose: ArrayLike, mode: Mode) -> FloatArray:
         """Joint centres (limbs, centres, 3) in metres at one pose, from the base along each limb."""
-        x, y, z = (float(value) for value in _poses(pose)[0])
+        x, y, z = (float(value) for value in self.coordinates(_poses(pose))[0])
         return np.asarray(pointwise.centres_at(self.geometry, mode.signs, x, y, z))
 
     def motor_weight(self, drive: str) -> float:
@@ -185,11 +216,11 @@ def _poses(points: ArrayLike) -> FloatArray:
     try:
         array = np.asarray(points, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ParameterError("Poses must be numbers.", remedy="Give an (N, 3) array in metres.") from None
+        raise ParameterError("Poses must be numbers.", remedy="Give an (N, 3) array in SI units.") from None
     if array.ndim == 1 and array.size == 3:
         array = array.reshape(1, 3)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise ParameterError(f"Poses have shape {array.shape}.", remedy="Give an (N, 3) array in metres.")
+        raise ParameterError(f"Poses have shape {array.shape}.", remedy="Give an (N, 3) array in SI units.")
     if not np.isfinite(array).all():
         raise ParameterError("A pose is not finite.", remedy="Remove NaN and infinite coordinates.")
     return array

@@ -72,6 +72,11 @@ def limb_tolerances(kind: MechanismKind, tolerance: Mapping[str, float]) -> dict
             )
         if not 0.0 <= bound < math.inf:
             raise ParameterError(f"The tolerance {name} = {bound!r} is not a non-negative number.")
+        if kind.tolerance_refusal is not None and bound > 0.0:
+            raise ParameterError(
+                f"Nothing is proved within tolerances of {kind.name}: {kind.tolerance_refusal}.",
+                remedy="Leave the tolerances out.",
+            )
         if parameter.dimension == "angle" and bound > 0.0:
             raise ParameterError(
                 f"{name} is an angle, and angles have no tolerance: misplaced axes destroy pure translation.",

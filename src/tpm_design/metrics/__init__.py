@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from tpm_design.errors import UsageError, did_you_mean
-from tpm_design.metrics import clearance, conditioning, motion, size, volume
+from tpm_design.metrics import clearance, conditioning, motion, size, tilt, volume
 from tpm_design.metrics.base import Metric
 
 METRICS: Mapping[str, Metric] = MappingProxyType(
     {
         metric.name: metric
-        for family in (volume, conditioning, clearance, motion, size)
+        for family in (volume, conditioning, clearance, motion, size, tilt)
         for metric in family.METRICS
     }
 )

@@ -18,12 +18,13 @@ UNDEFINED = "undefined"
 class Option:
     """One option of a metric.
 
-    ``kind``: "choice" (one of ``choices``), "number" (within ``minimum``..``maximum``, no unit) or
-    "point" (three lengths in the study's unit, handed on in metres). ``default`` None: not given.
+    ``kind``: "choice" (one of ``choices``), "number" (within ``minimum``..``maximum``, no unit), "length" (a
+    positive length) or "point" (three lengths), in the study's unit and handed on in metres.
+    ``default`` None: not given.
     """
 
     name: str
-    kind: Literal["choice", "number", "point"]
+    kind: Literal["choice", "number", "length", "point"]
     description: str
     default: Any = None
     choices: tuple[str, ...] = ()
@@ -56,16 +57,22 @@ class Measurement:
         return cls(float("nan"), notes={UNDEFINED: reason})
 
 
-def of_positions(kind: MechanismKind) -> bool:
-    """Whether a metric in metres or cubic metres of pose space means anything: poses are positions."""
-    return kind.translational
+def never_refused(kind: MechanismKind, limits: Mapping[str, Any]) -> str | None:
+    """A metric that means something for every mechanism."""
+    return None
+
+
+def of_positions(kind: MechanismKind, limits: Mapping[str, Any]) -> str | None:
+    """A metric in metres or cubic metres of pose space: poses must be positions."""
+    return None if kind.translational else f"the poses of {kind.name} are not positions"
 
 
 @dataclass(frozen=True)
 class Metric:
     """One figure of merit. ``scale`` (in the metric's SI unit) makes its violation dimensionless. ``notes``:
-    names of the notes its measurements may carry. ``applies``: whether it means anything for a mechanism;
-    ``drives``: those of the mechanism's drives for which it does, the usual one first."""
+    names of the notes its measurements may carry. ``refusal(kind, limits)``: why it means nothing for a
+    mechanism with these limits, None where it does; ``drives``: those of the mechanism's drives for which it
+    does, the usual one first."""
 
     name: str
     unit: str
@@ -78,7 +85,7 @@ class Metric:
     needs_region: bool = True
     differentiable: bool = True
     notes: tuple[str, ...] = ()
-    applies: Callable[[MechanismKind], bool] = lambda kind: True
+    refusal: Callable[[MechanismKind, Mapping[str, Any]], str | None] = never_refused
     drives: Callable[[MechanismKind], tuple[str, ...]] = lambda kind: kind.drives
 
     def option(self, name: str) -> Option | None:

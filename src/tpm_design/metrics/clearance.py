@@ -54,7 +54,7 @@ def _distance(name: str, condition: str) -> Metric:
     return Metric(
         f"{name}_singularity_distance", "m", "maximize", 0.1,
         f"least Euclidean distance from the region to {condition}; minus the depth where it cuts in",
-        SEARCH, _locus_distance(name), differentiable=False, notes=("locus",), applies=of_positions,
+        SEARCH, _locus_distance(name), differentiable=False, notes=("locus",), refusal=of_positions,
     )  # fmt: skip
 
 
@@ -65,7 +65,7 @@ METRICS = (
     Metric(
         "boundary_distance", "m", "maximize", 0.1,
         "least Euclidean distance from the region to the reach boundary", SEARCH, _boundary_distance,
-        applies=of_positions,
+        refusal=of_positions,
     ),
     Metric(
         "singularity_margin_min", "-", "maximize", 1.0,

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tpm_design.metrics.base import Measurement, Metric, Option, of_positions
+from tpm_design.mechanisms.base import MechanismKind
+from tpm_design.metrics.base import Measurement, Metric, Option
 from tpm_design.metrics.context import Context
 from tpm_design.workspace.averages import GAUSS_NODES, Averages, conditioning_averages
 from tpm_design.workspace.indices import CONDITION_2, CONDITION_FROBENIUS, Index, index_values
@@ -18,6 +19,21 @@ NORM = Option("norm", "choice", "norm of the condition number", default="2", cho
 DRIVE = Option("drive", "choice", "actuators: motors or joints", default="motor", choices=("motor", "joint"))
 OVER = Option("over", "choice", "domain", default="region", choices=("region", "aspect"))
 THRESHOLD = Option("threshold", "number", "1/κ asked for", minimum=0.0, maximum=1.0, required=True)
+
+
+def _incomparable(kind: MechanismKind, limits: Mapping[str, Any]) -> str | None:
+    """A condition number compares motions of one unit, or made to be of one by a length."""
+    if kind.translational or "characteristic_length" in limits:
+        return None
+    return (
+        f"J of {kind.name} mixes rotations and translations: with `characteristic_length` among the limits, "
+        "by which rotations are multiplied, κ is defined"
+    )
+
+
+def _no_volume(kind: MechanismKind, limits: Mapping[str, Any]) -> str | None:
+    """A mean needs a measure of sets of poses."""
+    return None if kind.translational else f"sets of poses of {kind.name} have no volume to average over"
 
 
 def _index(context: Context, options: Mapping[str, Any]) -> Index:
@@ -63,7 +79,7 @@ def _at_points(context: Context, options: Mapping[str, Any]) -> np.ndarray:
     values = index_values(
         context.mechanism.geometry, context.mode.signs, _index(context, options), context.poses
     )
-    usable = ~np.isnan(context.mechanism.ik(context.poses, context.mode)).any(axis=1)
+    usable = context.mechanism.margins_at(context.poses, context.mode)["reach"] >= 0.0
     return np.where(usable, values, 0.0)
 
 
@@ -101,14 +117,14 @@ def _share_of(
 METRICS = (
     Metric(
         "conditioning_min", "-", "maximize", 1.0, "least 1/κ over the domain", SOURCE, _minimum,
-        (NORM, DRIVE, OVER), applies=of_positions,
+        (NORM, DRIVE, OVER), refusal=_incomparable,
     ),
     Metric(
         "conditioning_mean", "-", "maximize", 1.0, "volume mean of 1/κ (GCI)", SOURCE, _mean,
-        (NORM, DRIVE, OVER), applies=of_positions,
+        (NORM, DRIVE, OVER), refusal=_no_volume,
     ),
     Metric(
         "conditioning_share", "-", "maximize", 1.0, "share of the domain with 1/κ ≥ threshold", SOURCE,
-        _share, (NORM, DRIVE, OVER, THRESHOLD), applies=of_positions,
+        _share, (NORM, DRIVE, OVER, THRESHOLD), refusal=_no_volume,
     ),
 )  # fmt: skip

@@ -96,7 +96,7 @@ class Context:
     @cached_property
     def lattice_determinants(self) -> NDArray[np.float64]:
         """Signed determinants (D, I, J, K) on the lattice, 0 where undefined."""
-        margins = self.mechanism.determinants(self.poses, self.mode)
+        margins = self.mechanism.determinants_at(self.poses, self.mode)
         return margins.reshape(len(margins), *self.grid.shape[:3])
 
     @cached_property

@@ -18,6 +18,12 @@ def _pushing(kind: MechanismKind) -> tuple[str, ...]:
     return () if kind.transmission_drive is None else (kind.transmission_drive,)
 
 
+def _no_transmission(kind: MechanismKind, limits: Mapping[str, Any]) -> str | None:
+    if kind.transmission_drive is not None:
+        return None
+    return f"the limbs of {kind.name} do not each push along a row of A"
+
+
 def _transmission(context: Context, options: Mapping[str, Any]) -> Measurement:
     if not context.reachable:
         return Measurement.undefined("the region is not reachable")
@@ -41,22 +47,22 @@ def _extreme(quantity: int, sign: float) -> Callable[[Context, Mapping[str, Any]
 METRICS = (
     Metric(
         "velocity_min", "m/rad or -", "maximize", 1.0, "least singular value of J over the region",
-        "singular values of ẋ = J q̇", _extreme(SLOWEST, 1.0), (DRIVE,), applies=of_positions,
+        "singular values of ẋ = J q̇", _extreme(SLOWEST, 1.0), (DRIVE,), refusal=of_positions,
     ),
     Metric(
         "velocity_max", "m/rad or -", "minimize", 1.0, "greatest singular value of J over the region",
-        "singular values of ẋ = J q̇", _extreme(FASTEST, -1.0), (DRIVE,), applies=of_positions,
+        "singular values of ẋ = J q̇", _extreme(FASTEST, -1.0), (DRIVE,), refusal=of_positions,
     ),
     Metric(
         "transmission_min", "-", "maximize", 1.0,
         "least input or output transmission index over the region",
         "J. Wang, C. Wu, X.-J. Liu, Performance evaluation of parallel manipulators, 2010",
-        _transmission, (DRIVE,), applies=lambda kind: kind.transmission_drive is not None, drives=_pushing,
+        _transmission, (DRIVE,), refusal=_no_transmission, drives=_pushing,
     ),
     Metric(
         "position_sensitivity", "-", "minimize", 1.0,
         "largest ‖∂x/∂(length errors)‖ over the region, actuators locked",
         "loop closure differentiated in every length", _extreme(SENSITIVITY, -1.0), (DRIVE,),
-        applies=of_positions,
+        refusal=of_positions,
     ),
 )  # fmt: skip

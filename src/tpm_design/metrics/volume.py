@@ -112,12 +112,12 @@ def _point_shares(context: Context) -> tuple[float, float]:
 METRICS = (
     Metric(
         "reachable_volume", "m³", "maximize", 0.1, "volume of the mode's reachable poses", RAYS,
-        _reachable_volume, needs_region=False, applies=of_positions,
+        _reachable_volume, needs_region=False, refusal=of_positions,
     ),
     Metric(
         "singularity_free_volume", "m³", "maximize", 0.1,
         "volume of the largest aspect, or of the one that holds `home`", RAYS,
-        _singularity_free_volume, (MARGIN, HOME), needs_region=False, applies=of_positions,
+        _singularity_free_volume, (MARGIN, HOME), needs_region=False, refusal=of_positions,
     ),
     Metric(
         "coverage", "-", "maximize", 1.0,
@@ -125,6 +125,6 @@ METRICS = (
     ),
     Metric(
         "workspace_ratio", "-", "maximize", 1.0, "singularity-free volume over robot_size³", RAYS,
-        _workspace_ratio, applies=of_positions,
+        _workspace_ratio, refusal=of_positions,
     ),
 )  # fmt: skip

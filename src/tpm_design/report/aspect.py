@@ -59,7 +59,7 @@ def home_of(goals: Sequence[Goal]) -> Pose | None:
 
 def _component_of_region(context: Context, field: RayField) -> int | None:
     """Of the sides that most of the region's lattice has, the pose nearest to the region's middle."""
-    margins = context.mechanism.margins(context.poses, context.mode)
+    margins = context.mechanism.margins_at(context.poses, context.mode)
     signs = np.column_stack([margins[name] > 0.0 for name in context.mechanism.kind.determinants])
     within = np.flatnonzero(margins["reach"] >= 0.0)
     if not within.size:

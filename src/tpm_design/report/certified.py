@@ -7,10 +7,12 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from tpm_design.certificates.document import FILE, canonical
 from tpm_design.report.escape import code, code_cell, table, text
-from tpm_design.report.reported import Reported
-from tpm_design.report.words import asked, lengths_text
+from tpm_design.report.reported import Reported, best_context
+from tpm_design.report.words import asked, pose_text
 from tpm_design.runs.tables import goal_unit
 from tpm_design.units import si_unit
 
@@ -90,5 +92,9 @@ def _why(reported: Reported, one: Mapping[str, Any]) -> str:
     breaking = one["breaking"]
     if breaking is None or breaking["pose"] is None:
         return text(str(one["reason"]))
-    at = lengths_text(breaking["pose"], reported.study.units)
+    context = best_context(reported)
+    if context is None:
+        return text(str(one["reason"]))
+    pose = context.mechanism.poses(np.array([breaking["pose"]]))[0]
+    at = pose_text(reported.problem.kind, pose.tolist(), reported.study.units)
     return text(f"broken at {at}: {one['reason']}")

@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from tpm_design.mechanisms.base import MechanismKind
-from tpm_design.report.slices import FloatArray, Slice, region_outline
+from tpm_design.report.slices import FloatArray, Plane, Slice, region_outline
 from tpm_design.report.style import (
     ASPECT_FILL,
     BLUE,
@@ -58,9 +58,16 @@ class _Frame:
     survey: Survey
     units: Units
 
-    @property
-    def factor(self) -> float:
-        return self.units.from_si(1.0, "m")
+    def factors(self, plane: Plane) -> FloatArray:
+        """From SI to the study's units, of the coordinates across and up (2,)."""
+        units = [self.kind.coordinate_units[side] for side in (plane.across, plane.up)]
+        return np.array([self.units.from_si(1.0, unit) for unit in units])
+
+    def axis_name(self, coordinate: int) -> str:
+        """``x [mm]``; a name alone where there is no unit."""
+        name = self.kind.coordinates[coordinate]
+        unit = self.units.name(self.kind.coordinate_units[coordinate])
+        return name if unit == "-" else f"{name} [{unit}]"
 
     @property
     def kind(self) -> MechanismKind:
@@ -73,14 +80,15 @@ def workspace_figure(survey: Survey, units: Units) -> Figure:
     figure, panels = _panels(frame, 12.0)
     drawn: set[int] = set()
     for axes, view in zip(panels, survey.slices, strict=True):
-        across, up = view.across * frame.factor, view.up * frame.factor
+        factors = frame.factors(view.plane)
+        across, up = view.across * factors[0], view.up * factors[1]
         axes.contourf(across, up, view.reach, levels=[0.0, np.inf], colors=[PALE])
         axes.contourf(across, up, view.aspect, levels=[0.0, np.inf], colors=[ASPECT_FILL])
-        _draw_lines(axes, view.reach_outline(), frame.factor, INK, 1.0, "solid")
+        _draw_lines(axes, view.reach_outline(), factors, INK, 1.0, "solid")
         for part in range(len(frame.kind.determinants)):
             lines = view.determinant_lines(part)
             colour, dash = LOCUS_STYLES[part % len(LOCUS_STYLES)]
-            _draw_lines(axes, lines, frame.factor, colour, 2.0, dash)
+            _draw_lines(axes, lines, factors, colour, 2.0, dash)
             if sum(map(_length, lines)) > SHORTEST * survey.slices[0].longest:
                 drawn.add(part)
         _draw_region(axes, view, frame)
@@ -101,7 +109,8 @@ def conditioning_figure(survey: Survey, shown: ConditioningShown, units: Units) 
     figure, panels = _panels(frame, 11.0)
     filled = None
     for axes, view in zip(panels, survey.slices, strict=True):
-        across, up = view.across * frame.factor, view.up * frame.factor
+        factors = frame.factors(view.plane)
+        across, up = view.across * factors[0], view.up * factors[1]
         filled = axes.contourf(
             across, up, np.clip(view.conditioning, 0.0, 1.0), levels=LEVELS, cmap="cividis",
             norm=BoundaryNorm(LEVELS, 256),
@@ -118,7 +127,7 @@ def conditioning_figure(survey: Survey, shown: ConditioningShown, units: Units) 
                 across, up, view.conditioning, levels=[shown.bound], colors=[VERMILLION], linewidths=1.4
             )
             edge.set_clip_path(reachable, transform=axes.transData)
-        _draw_lines(axes, view.reach_outline(), frame.factor, INK, 1.0, "solid")
+        _draw_lines(axes, view.reach_outline(), factors, INK, 1.0, "solid")
         _draw_region(axes, view, frame)
         _note_plane(axes, view, frame.kind)
     if filled is not None:
@@ -139,21 +148,24 @@ def conditioning_figure(survey: Survey, shown: ConditioningShown, units: Units) 
 def _panels(frame: _Frame, room: float) -> tuple[Figure, Sequence[Axes]]:
     """Three panels side by side at one scale, ``room`` inches together."""
     views = frame.survey.slices
-    widths = [float(np.ptp(view.across)) for view in views]
-    heights = [float(np.ptp(view.up)) for view in views]
+    widths, heights = [1.0] * len(views), [1.0] * len(views)
+    if frame.kind.translational:
+        widths = [float(np.ptp(view.across)) for view in views]
+        heights = [float(np.ptp(view.up)) for view in views]
     scale = room / sum(widths)
     figure = new_figure(13.5, min(9.0, max(3.0, scale * max(heights)) + 1.6), "compressed")
     panels = figure.subplots(1, len(views), width_ratios=widths)
-    names, unit = frame.kind.pose, frame.units.name("m")
     for axes, view in zip(panels, views, strict=True):
         plane = view.plane
-        axes.set_aspect("equal")
-        axes.set_xlim(*(frame.factor * view.across[[0, -1]]))
-        axes.set_ylim(*(frame.factor * view.up[[0, -1]]))
-        axes.set_xlabel(f"{names[plane.across]} [{unit}]", fontsize=TEXT)
-        axes.set_ylabel(f"{names[plane.up]} [{unit}]", fontsize=TEXT)
-        height = frame.units.from_si(plane.height, "m")
-        axes.set_title(f"{names[plane.normal]} = {height:.4g} {unit}", fontsize=TEXT, color=INK)
+        factors = frame.factors(plane)
+        if frame.kind.translational:
+            axes.set_aspect("equal")
+        axes.set_xlim(*(factors[0] * view.across[[0, -1]]))
+        axes.set_ylim(*(factors[1] * view.up[[0, -1]]))
+        axes.set_xlabel(frame.axis_name(plane.across), fontsize=TEXT)
+        axes.set_ylabel(frame.axis_name(plane.up), fontsize=TEXT)
+        height = frame.units.written(plane.height, frame.kind.coordinate_units[plane.normal], 4)
+        axes.set_title(f"{frame.kind.coordinates[plane.normal]} = {height}", fontsize=TEXT, color=INK)
         axes.xaxis.set_major_locator(MaxNLocator(6))
         axes.yaxis.set_major_locator(MaxNLocator(6))
         tidy(axes)
@@ -161,11 +173,11 @@ def _panels(frame: _Frame, room: float) -> tuple[Figure, Sequence[Axes]]:
 
 
 def _draw_lines(
-    axes: Axes, lines: Sequence[FloatArray], factor: float, colour: str, width: float, dash: Dash
+    axes: Axes, lines: Sequence[FloatArray], factors: FloatArray, colour: str, width: float, dash: Dash
 ) -> None:
     axes.add_collection(
         LineCollection(
-            [factor * line for line in lines], colors=colour, linewidths=width, linestyles=[dash], zorder=3
+            [factors * line for line in lines], colors=colour, linewidths=width, linestyles=[dash], zorder=3
         )
     )
 
@@ -177,8 +189,8 @@ def _length(line: FloatArray) -> float:
 def _draw_nearest(axes: Axes, view: Slice, frame: _Frame) -> None:
     if frame.survey.nearest is None:
         return
-    pose = frame.factor * np.asarray(frame.survey.nearest.pose)
-    at = pose[view.plane.across], pose[view.plane.up]
+    pose = np.asarray(frame.survey.nearest.pose)[[view.plane.across, view.plane.up]]
+    at = frame.factors(view.plane) * pose
     axes.plot(*at, marker="x", color="white", markersize=9, markeredgewidth=4.0, zorder=5)
     axes.plot(*at, marker="x", color=INK, markersize=8, markeredgewidth=2.0, zorder=5)
 
@@ -198,7 +210,7 @@ def _draw_region(axes: Axes, view: Slice, frame: _Frame) -> None:
     region = frame.survey.context.region
     if region is None:
         return
-    outline = frame.factor * region_outline(region, view.plane)
+    outline = frame.factors(view.plane) * region_outline(region, view.plane)
     if region.form == POINTS:
         axes.plot(outline[:, 0], outline[:, 1], ".", color=GREEN, markersize=6, zorder=4)
         return

@@ -55,10 +55,17 @@ def planes_through(pose: Sequence[float]) -> tuple[Plane, Plane, Plane]:
 
 @dataclass(frozen=True)
 class Window:
-    """The part of the pose space that is drawn: ``low`` and ``high`` (m) of every coordinate."""
+    """The part of the pose space that is drawn: ``low`` and ``high`` (SI) of every coordinate. ``to_scale``:
+    all are lengths, drawn to one scale."""
 
     low: tuple[float, float, float]
     high: tuple[float, float, float]
+    to_scale: bool = True
+
+    def steps(self, nodes: int) -> FloatArray:
+        """Steps (3,) of a grid with so many nodes along the longest side, or along each."""
+        sides = np.asarray(self.high) - np.asarray(self.low)
+        return np.asarray(np.where(self.to_scale, sides.max(), sides) / nodes)
 
     def nodes(self, coordinate: int, step: float) -> FloatArray:
         """Multiples of ``step`` that cover one coordinate."""
@@ -66,30 +73,26 @@ class Window:
         last = np.ceil(self.high[coordinate] / step)
         return np.asarray(step * np.arange(first, last + 1))
 
-    @property
-    def longest(self) -> float:
-        return max(high - low for low, high in zip(self.low, self.high, strict=True))
-
 
 def window(context: Context, planes: Sequence[Plane]) -> Window:
     """What holds the reachable poses of the planes and the region, with some room around."""
-    radius = context.mechanism.reach_radius()
-    step = 2.0 * radius / COARSE_NODES
-    whole = Window((-radius,) * 3, (radius,) * 3)
+    half = np.asarray(context.mechanism.reach_half_axes())
+    whole = Window(_triple(-half), _triple(half), context.mechanism.kind.translational)
+    step = whole.steps(COARSE_NODES)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for plane in planes:
-        poses = plane.poses(whole.nodes(plane.across, step), whole.nodes(plane.up, step))
+        poses = plane.poses(*(whole.nodes(side, step[side]) for side in (plane.across, plane.up)))
         inside = poses[reach_margins(context, poses) >= 0.0]
         for coordinate in (plane.across, plane.up):
             if inside.size:
-                low[coordinate] = min(low[coordinate], inside[:, coordinate].min() - step)
-                high[coordinate] = max(high[coordinate], inside[:, coordinate].max() + step)
+                low[coordinate] = min(low[coordinate], inside[:, coordinate].min() - step[coordinate])
+                high[coordinate] = max(high[coordinate], inside[:, coordinate].max() + step[coordinate])
     if context.region is not None:
         box_low, box_high = region_box(context.region)
         low, high = np.minimum(low, box_low), np.maximum(high, box_high)
-    low, high = np.where(low <= high, low, -radius), np.where(low <= high, high, radius)
-    room = PADDING * float((high - low).max())
-    return Window(_triple(low - room), _triple(high + room))
+    low, high = np.where(low <= high, low, -half), np.where(low <= high, high, half)
+    room = PADDING * ((high - low).max() if whole.to_scale else high - low)
+    return Window(_triple(low - room), _triple(high + room), whole.to_scale)
 
 
 def reach_margins(context: Context, poses: FloatArray) -> FloatArray:
@@ -148,13 +151,13 @@ def slice_fields(
     nodes: int = NODES,
 ) -> Slice:
     """The fields on one plane. ``index``: the conditioning that is shown."""
-    step = extent.longest / nodes
-    across, up = extent.nodes(plane.across, step), extent.nodes(plane.up, step)
+    step = extent.steps(nodes)
+    across, up = (extent.nodes(side, step[side]) for side in (plane.across, plane.up))
     poses = plane.poses(across, up)
     shape = (up.size, across.size)
     mechanism, mode = context.mechanism, context.mode
     reach = reach_margins(context, poses)
-    everywhere = mechanism.determinants(poses, mode)
+    everywhere = mechanism.determinants_at(poses, mode)
     conditioning = index_values(mechanism.geometry, mode.signs, index, poses)
     return Slice(
         plane=plane,

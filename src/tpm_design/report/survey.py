@@ -54,7 +54,7 @@ def conditioning_shown(problem: Problem) -> ConditioningShown:
 
 def has_conditioning(problem: Problem) -> bool:
     """Whether a condition number has a meaning for the mechanism."""
-    return METRICS["conditioning_min"].applies(problem.kind)
+    return METRICS["conditioning_min"].refusal(problem.kind, problem.limits) is None
 
 
 def _bound_of(goal: Goal) -> float | None:
@@ -91,6 +91,8 @@ class Survey:
         """What the slices show."""
         size = f"Robot size {units.written(self.size, 'm', 4)}: " if self.size is not None else ""
         if self.context.region is None:
+            if self.volumes is None and not self.context.mechanism.kind.translational:
+                return f"{size}what the mode reaches and where it is singular"
             if self.volumes is None:
                 return "The mode reaches nothing"
             free, whole = (units.written(volume, "m³", 4) for volume in self.volumes)
@@ -153,6 +155,8 @@ def _size(context: Context, aspect: ChosenAspect | None) -> float | None:
 
 def _volumes(context: Context, home: Pose | None) -> tuple[float, float] | None:
     """As the volume metrics have them."""
+    if not context.mechanism.kind.translational:
+        return None
     field = context.aspects[0] if context.region is None else None
     if field is None or not field.volumes.size:
         return None
@@ -162,7 +166,8 @@ def _volumes(context: Context, home: Pose | None) -> tuple[float, float] | None:
 
 
 def _nearest(context: Context) -> Nearest | None:
-    if context.region is None or not context.reachable:
+    # distances between poses that are not positions mean nothing
+    if context.region is None or not context.reachable or not context.mechanism.kind.translational:
         return None
     edge = context.least(Index(LEGS))
     found = [Nearest("reach boundary", edge.value, edge.pose)]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.problem import Goal, Problem
 from tpm_design.units import Units, si_unit
-from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere
+from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere, Tilt
 
 MOST_LISTED = 8
 
@@ -32,6 +33,8 @@ def options_text(goal: Goal, units: Units) -> str:
             continue
         if option.kind == "point":
             parts.append(f"{option.name} {lengths_text(value, units)}")
+        elif option.kind == "length":
+            parts.append(f"{option.name} {units.written(value, 'm')}")
         elif option.kind == "number":
             parts.append(f"{option.name} {value:g}")
         else:
@@ -43,6 +46,20 @@ def lengths_text(values: Sequence[float], units: Units) -> str:
     """Lengths (m) of a point or of half axes: ``(200, 100, 50) mm``."""
     numbers = ", ".join(f"{units.from_si(value, 'm'):.6g}" for value in values)
     return f"({numbers}) {units.name('m')}"
+
+
+def pose_text(kind: MechanismKind, pose: Sequence[float], units: Units) -> str:
+    """A pose as users write it: ``(200, 100, 50) mm``, ``(alpha, beta, d) = (90 deg, 54 deg, 94 mm)``."""
+    if kind.translational:
+        return lengths_text(pose, units)
+    values = ", ".join(units.written(value, unit) for value, unit in zip(pose, kind.pose_units, strict=True))
+    return f"({', '.join(kind.pose)}) = ({values})"
+
+
+def pose_unit_names(kind: MechanismKind, units: Units) -> str:
+    """``mm``, or ``deg, deg, mm`` where they differ."""
+    names = [units.name(unit) for unit in kind.pose_units]
+    return names[0] if len(set(names)) == 1 else ", ".join(names)
 
 
 def shape_text(shape: Shape, units: Units) -> str:
@@ -57,6 +74,9 @@ def shape_text(shape: Shape, units: Units) -> str:
         return f"a ball of radius {units.written(shape.radius, 'm')}"
     if isinstance(shape, Ellipsoid):
         return f"an ellipsoid of half axes {lengths_text(shape.semi_axes, units)}"
+    if isinstance(shape, Tilt):
+        tilt, height = units.written(shape.tilt, "rad"), units.written(shape.height, "m")
+        return f"every tilt up to {tilt}, whichever way, over distances of {height}"
     assert isinstance(shape, Points)
     return f"{len(shape.points)} single poses"
 
@@ -65,10 +85,15 @@ def centre_text(problem: Problem, units: Units) -> str:
     """Where the region's centre is."""
     free = [v.name for v in problem.variables if v.name.startswith("center_")]
     if not free:
-        centre = [float(problem.fixed[f"center_{axis}"]) for axis in "xyz"]
+        centre = [float(problem.fixed[name]) for name in problem.kind.centre_names]
+        if len(centre) == 1:
+            name = problem.kind.centre_names[0].removeprefix("center_")
+            return f"its centre at {name} = {units.written(centre[0], 'm')}"
         return f"its centre at {lengths_text(centre, units)}"
     axes = ", ".join(name.removeprefix("center_") for name in free)
-    return "its centre free" if len(free) == 3 else f"its centre free along {axes}"
+    return (
+        "its centre free" if len(free) == len(problem.kind.centre_names) else f"its centre free along {axes}"
+    )
 
 
 def range_text(problem: Problem, name: str, units: Units) -> str:

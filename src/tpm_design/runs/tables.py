@@ -25,7 +25,7 @@ class Column:
 def parameter_columns(problem: Problem, units: Units) -> list[Column]:
     """Every design quantity, fixed ones included, in the order of the mechanism."""
     free = {variable.name: si_unit(variable.dimension) for variable in problem.variables}
-    order = [*problem.kind.parameter_names(), "center_x", "center_y", "center_z", "mode"]
+    order = [*problem.kind.parameter_names(), *problem.kind.centre_names, "mode"]
     columns = []
     for name in order:
         if name in free or name in problem.fixed or name in problem.ties:

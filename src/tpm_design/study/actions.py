@@ -157,7 +157,7 @@ def evaluations_frame(study: Study, entries: tuple[Entry, ...]) -> pd.DataFrame:
 
 
 def pose_values(study: Study, design: Design, pose: tuple[float, float, float]) -> dict[str, Any]:
-    """Joint values, Jacobian and margins at one pose (m), SI; None where a value does not exist."""
+    """Joint values, Jacobian and margins at one pose as users write it, SI; None where there is none."""
     import numpy as np
 
     from tpm_design.problem import design_context

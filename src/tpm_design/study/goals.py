@@ -27,6 +27,7 @@ class GoalReader:
         metrics: Mapping[str, Metric],
         kind: MechanismKind,
         units: Units,
+        limits: Mapping[str, Any],
         has_region: bool,
         taken: Iterable[str],
         faults: Faults,
@@ -34,6 +35,7 @@ class GoalReader:
         self._metrics = metrics
         self._kind = kind
         self._units = units
+        self._limits = limits
         self._has_region = has_region
         self._taken = {*taken, *_COLUMNS}
         self._labels: dict[str, Place] = {}
@@ -50,11 +52,12 @@ class GoalReader:
             remedy = did_you_mean(entry.metric, self._metrics)
             self._faults.add((*place, "metric"), f"there is no metric {shown(entry.metric)}", remedy)
             return None
-        if not metric.applies(self._kind):
-            useful = [name for name, other in self._metrics.items() if other.applies(self._kind)]
+        refusal = metric.refusal(self._kind, self._limits)
+        if refusal is not None:
+            useful = [n for n, other in self._metrics.items() if not other.refusal(self._kind, self._limits)]
             self._faults.add(
                 (*place, "metric"),
-                f"{metric.name} has no meaning for the mechanism {self._kind.name}",
+                f"{metric.name} has no meaning here: {refusal}",
                 f"Remove it. Metrics for {self._kind.name}: {', '.join(sorted(useful))}.",
             )
             return None
@@ -76,12 +79,15 @@ class GoalReader:
             maximum = None if entry.max is None else self._units.to_si(entry.max, unit)
             written |= {"min": entry.min, "max": entry.max}
         written |= options
-        points = {option.name for option in metric.options if option.kind == "point"}
-        in_si = {
-            name: tuple(self._units.to_si(v, "m") for v in value) if name in points and value else value
-            for name, value in options.items()
-        }
+        in_si = {option.name: self._in_si(option, options[option.name]) for option in metric.options}
         return Goal(metric, label, in_si, sense, minimum, maximum), plain(written)
+
+    def _in_si(self, option: Option, value: Any) -> Any:
+        if value is None or option.kind not in ("point", "length"):
+            return value
+        if option.kind == "length":
+            return self._units.to_si(value, "m")
+        return tuple(self._units.to_si(v, "m") for v in value)
 
     def _choices(self, metric: Metric, option: Option) -> tuple[str, ...]:
         """The choices there are for this mechanism: it may know one drive only."""
@@ -159,6 +165,10 @@ def _option_value(option: Option, value: Any, choices: tuple[str, ...]) -> Any:
             low = f" from {option.minimum:g}" if math.isfinite(option.minimum) else ""
             high = f" up to {option.maximum:g}" if math.isfinite(option.maximum) else ""
             raise ValueError(f"Give a number{low}{high}.")
+        return float(value)
+    if option.kind == "length":
+        if not _is_number(value) or not value > 0.0:
+            raise ValueError("Give a length greater than 0.")
         return float(value)
     if not isinstance(value, list) or len(value) != 3 or not all(map(_is_number, value)):
         raise ValueError("Give three lengths: [x, y, z].")

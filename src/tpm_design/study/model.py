@@ -268,8 +268,30 @@ class PointsModel(Strict):
         return self
 
 
+class DistanceCenter(Strict):
+    """``center: {d}``: the middle of the distances."""
+
+    d: Quantity
+
+
+DistanceCenterValue = Annotated[
+    Annotated[Literal["free"], Tag("word")] | Annotated[DistanceCenter, Tag("axes")],
+    Discriminator(lambda value: "word" if isinstance(value, str) else "axes"),
+]
+
+
+class TiltModel(Strict):
+    """Every tilt up to one, whichever way, over a height of distances."""
+
+    type: Literal["tilt"]
+    tilt: Positive
+    height: Positive
+    center: DistanceCenterValue
+
+
 RegionModel = Annotated[
-    BoxModel | CylinderModel | SphereModel | EllipsoidModel | PointsModel, Field(discriminator="type")
+    BoxModel | CylinderModel | SphereModel | EllipsoidModel | PointsModel | TiltModel,
+    Field(discriminator="type"),
 ]
 
 

@@ -11,8 +11,6 @@ from tpm_design.study.faults import Faults
 from tpm_design.study.model import Range, Values
 from tpm_design.units import Units, si_unit
 
-CENTER = ("center_x", "center_y", "center_z")
-
 _WORDS: dict[Domain, str] = {
     "positive": "greater than 0",
     "non-negative": "0 or more",
@@ -23,7 +21,7 @@ _WORDS: dict[Domain, str] = {
 
 def meaning(name: str, kind: MechanismKind, *, mirrored: bool = False) -> tuple[Dimension, Domain]:
     """Dimension and domain of a parameter of the mechanism or a coordinate of the region's centre."""
-    if name in CENTER:
+    if name in kind.centre_names:
         return "length", "non-negative" if mirrored else "any"
     parameter = kind.parameter(name)
     if parameter is None:

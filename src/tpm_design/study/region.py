@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tpm_design.errors import StudyError
+from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.study.beside import file_beside
 from tpm_design.study.document import number, read_text, where
 from tpm_design.study.faults import Faults, shown
@@ -18,14 +19,26 @@ from tpm_design.study.model import (
     EllipsoidModel,
     PointsModel,
     SphereModel,
+    TiltModel,
 )
 from tpm_design.units import Units
-from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere
+from tpm_design.workspace.regions import REGIONS, Box, Cylinder, Ellipsoid, Points, Shape, Sphere, Tilt
 
 Triple = tuple[float, float, float]
-AnyRegion = BoxModel | CylinderModel | SphereModel | EllipsoidModel | PointsModel
+AnyRegion = BoxModel | CylinderModel | SphereModel | EllipsoidModel | PointsModel | TiltModel
 
 MOST_POINTS = 10_000  # so that a resolved study, which holds them, stays below 1 MB
+
+
+def check_form(name: str, kind: MechanismKind, faults: Faults) -> None:
+    """Faults where the mechanism's poses cannot fill a region of this form."""
+    if REGIONS[name].positions != kind.translational:
+        suitable = [form.name for form in REGIONS.values() if form.positions == kind.translational]
+        faults.stop(
+            ("region", "type"),
+            f"the poses of {kind.name} ({', '.join(kind.pose)}) do not fill a {name} region",
+            f"Choose {' or '.join(suitable)}.",
+        )
 
 
 def read_region(model: AnyRegion, units: Units, folder: Path, faults: Faults) -> tuple[Shape, dict[str, Any]]:
@@ -45,6 +58,11 @@ def read_region(model: AnyRegion, units: Units, folder: Path, faults: Faults) ->
     if isinstance(model, CylinderModel):
         cylinder = Cylinder(units.to_si(model.radius, "m"), units.to_si(model.height, "m"))
         return cylinder, written | {"radius": model.radius, "height": model.height}
+    if isinstance(model, TiltModel):
+        tilt = Tilt(units.to_si(model.tilt, "rad"), units.to_si(model.height, "m"))
+        if tilt.tilt >= math.pi:
+            faults.stop(("region", "tilt"), "the tilt is half a turn or more", "Choose a smaller one.")
+        return tilt, written | {"tilt": model.tilt, "height": model.height}
     points = model.points or _read_points(str(model.file), folder, faults)
     if len(points) > MOST_POINTS:
         faults.stop(

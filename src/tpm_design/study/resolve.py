@@ -27,7 +27,7 @@ from tpm_design.study.model import (
 from tpm_design.study.plain import plain
 from tpm_design.study.plug_in import PlugIn, read_plug_in
 from tpm_design.study.quantities import interval
-from tpm_design.study.region import read_region
+from tpm_design.study.region import check_form, read_region
 from tpm_design.study.registries import Registries, registries
 from tpm_design.study.space import (
     free_center,
@@ -64,6 +64,8 @@ def resolve(document: Document, model: StudyModel, known: Registries, *, allow_c
     units = Units(model.units.length, model.units.angle)
     kind, plug_in = _kind(model.mechanism, document, known, faults, allow_code=allow_code)
     region = model.region
+    if region is not None:
+        check_form(region.type, kind, faults)
     center = region.center if region else None
     parameters = read_parameters(model.mechanism, kind, units, faults)
     ties = read_ties(model.mechanism, kind, parameters, faults)
@@ -90,7 +92,7 @@ def resolve(document: Document, model: StudyModel, known: Registries, *, allow_c
     else:
         variables.append(Variable("mode", "mode", values=tuple(modes)))
 
-    reader = GoalReader(known.metrics, kind, units, region is not None, (*quantities, *ties), faults)
+    reader = GoalReader(known.metrics, kind, units, limits, region is not None, (*quantities, *ties), faults)
     objectives = reader.read("objectives", model.objectives)
     constraints = reader.read("constraints", model.constraints)
     record = reader.read("record", model.record)
@@ -203,6 +205,12 @@ def _tolerance(model: CertifyModel, kind: MechanismKind, units: Units, faults: F
         if kind.parameter(name) is None:
             remedy = did_you_mean(name, kind.parameter_names())
             faults.add(("certify", "tolerance", name), f"{kind.name} has no parameter {shown(name)}", remedy)
+    if kind.tolerance_refusal is not None and any(model.tolerance.values()):
+        faults.add(
+            ("certify", "tolerance"),
+            f"nothing is proved within tolerances of {kind.name}: {kind.tolerance_refusal}",
+            "Remove the tolerances.",
+        )
     found: dict[str, float] = {}
     for name in kind.parameter_names():
         parameter = kind.parameter(name)

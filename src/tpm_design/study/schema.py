@@ -153,4 +153,6 @@ def _option(option: Option) -> Schema:
             "type": "number",
             **{key: bound for key, bound in bounds.items() if abs(bound) != float("inf")},
         }
+    if option.kind == "length":
+        return schema | {"type": "number", "exclusiveMinimum": 0}
     return schema | {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}

@@ -12,15 +12,17 @@ from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter
 from tpm_design.problem import Variable
 from tpm_design.study.document import Place
 from tpm_design.study.faults import Faults, shown
-from tpm_design.study.model import Center, Equals, Limits, LimitValue, MechanismModel, Quantity, Range
-from tpm_design.study.quantities import (
-    CENTER,
-    domain_words,
-    interval,
-    meaning,
-    read_quantity,
-    within,
+from tpm_design.study.model import (
+    Center,
+    DistanceCenter,
+    Equals,
+    Limits,
+    LimitValue,
+    MechanismModel,
+    Quantity,
+    Range,
 )
+from tpm_design.study.quantities import domain_words, interval, meaning, read_quantity, within
 from tpm_design.units import Units, si_unit
 
 Modes = dict[str, dict[str, str]]
@@ -234,7 +236,7 @@ def _signs(text: str, field: ModeField, faults: Faults) -> str:
 
 def free_center(
     kind: MechanismKind, ranges: Mapping[str, tuple[float, float]], modes: Modes, units: Units, faults: Faults
-) -> Center:
+) -> Center | DistanceCenter:
     """``center: free`` written out: as far as the mechanism can reach, on the octant's side of each plane."""
     reach = units.from_si(kind.farthest_reach(ranges), "m")
     if math.isinf(reach):
@@ -248,6 +250,8 @@ def free_center(
     # four digits, rounded up: still a bound, and one that can be read
     grain = 10.0 ** (math.floor(math.log10(reach)) - 3)
     reach = float(f"{math.ceil(reach / grain) * grain:.6g}")
+    if not kind.translational:
+        return DistanceCenter.model_validate({"d": {"min": 0, "max": reach}})
     below, above = {"min": -reach, "max": 0}, {"min": 0, "max": reach}
     octants = {mode.get("octant", "any") for mode in modes.values()}
     sides: list[dict[str, float]]
@@ -262,19 +266,20 @@ def free_center(
 
 
 def read_center(
-    given: tuple[float, float, float] | Center,
+    given: tuple[float, float, float] | Center | DistanceCenter,
     kind: MechanismKind,
     modes: Modes,
     units: Units,
     faults: Faults,
 ) -> dict[str, float | Variable]:
-    """The region's centre as three design quantities (m)."""
+    """The region's centre as design quantities (m), one for each length of the pose."""
     mirrored = isinstance(given, Center) and given.mirrored
-    axes: dict[str, Quantity] = (
-        {"x": given.x, "y": given.y, "z": given.z}
-        if isinstance(given, Center)
-        else dict(zip("xyz", given, strict=True))
-    )
+    if isinstance(given, DistanceCenter):
+        axes: dict[str, Quantity] = {"d": given.d}
+    elif isinstance(given, Center):
+        axes = {"x": given.x, "y": given.y, "z": given.z}
+    else:
+        axes = dict(zip("xyz", given, strict=True))
     if mirrored and any("any" in mode.get("octant", "any") for mode in modes.values()):
         faults.add(
             ("region", "center", "mirrored"),
@@ -286,7 +291,8 @@ def read_center(
         told = f"a mirrored centre needs ranges, {' and '.join(fixed)} has none"
         faults.add(("region", "center", fixed[0]), told, "Write {min: …, max: …}.")
     found: dict[str, float | Variable] = {}
-    for name, (axis, value) in zip(CENTER, axes.items(), strict=True):
+    for axis, value in axes.items():
+        name = f"center_{axis}"
         place = ("region", "center", axis)
         dimension, domain = meaning(name, kind, mirrored=mirrored)
         found[name] = read_quantity(name, value, dimension, domain, place, units, faults, mirrored=mirrored)

@@ -13,7 +13,7 @@ from tpm_design.study.document import Place
 from tpm_design.study.faults import Faults, shown
 from tpm_design.study.model import LARGEST_GRID, GridModel, Listed, ListModel, SampleModel, Steps
 from tpm_design.study.plain import plain
-from tpm_design.study.quantities import CENTER, domain_words, meaning, within
+from tpm_design.study.quantities import domain_words, meaning, within
 from tpm_design.units import Units, si_unit
 
 Item = TypeVar("Item")
@@ -49,7 +49,11 @@ Sweep = GridSweep | ListSweep | SampleSweep
 def design_names(problem: Problem) -> list[str]:
     """Every design quantity in order: parameters, centre, mode."""
     given = {*problem.fixed, *(variable.name for variable in problem.variables)}
-    return [name for name in (*problem.kind.parameter_names(), *CENTER, "mode") if name in given]
+    return [
+        name
+        for name in (*problem.kind.parameter_names(), *problem.kind.centre_names, "mode")
+        if name in given
+    ]
 
 
 def design_value(name: str, value: float | str, problem: Problem, units: Units) -> float | str:

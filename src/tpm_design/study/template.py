@@ -36,7 +36,7 @@ def template(name: str, kind: MechanismKind) -> str:
     )
     limits = f"\n  # limits there are:\n{limits}" if limits else ""
     reach = kind.farthest_reach({parameter: (value, value) for parameter, value in kind.example.items()})
-    edge = _round(_UNITS.from_si(reach, "m") / 8)
+    region = _region(kind, _round(_UNITS.from_si(reach, "m") / 8))
     return f"""\
 # A study for tpm-design. `tpm-design validate` checks it, `tpm-design optimize` runs it.
 version: 1
@@ -49,9 +49,7 @@ mechanism:
   parameters:
 {chr(10).join(lines)}{mode}{limits}
   limits: {{}}
-# The poses the robot must serve: box {{size}}, cylinder {{radius, height}}, sphere {{radius}},
-# ellipsoid {{semi_axes}} or points {{file: poses.csv}}. center: [x, y, z] places it; free: the search does.
-region: {{type: box, size: [{edge:g}, {edge:g}, {edge:g}], center: free}}
+{region}
 objectives:
 {_objective(kind)}
 constraints:
@@ -59,6 +57,18 @@ constraints:
 optimizer: {{method: scipy.differential_evolution, budget: 400, seed: 1}}    # budget: designs evaluated
 accuracy: {{volume: 1e-3}}    # relative error of volumes and averages
 """
+
+
+def _region(kind: MechanismKind, edge: float) -> str:
+    if not kind.translational:
+        return f"""\
+# The poses the robot must serve: every tilt up to one, whichever way, over a height of distances d.
+# center: {{d: …}} places it; free: the search does.
+region: {{type: tilt, tilt: 20, height: {edge:g}, center: free}}"""
+    return f"""\
+# The poses the robot must serve: box {{size}}, cylinder {{radius, height}}, sphere {{radius}},
+# ellipsoid {{semi_axes}} or points {{file: poses.csv}}. center: [x, y, z] places it; free: the search does.
+region: {{type: box, size: [{edge:g}, {edge:g}, {edge:g}], center: free}}"""
 
 
 def _round(value: float) -> float:
@@ -80,7 +90,7 @@ def _parameter(parameter: Parameter, kind: MechanismKind, free: bool) -> str:
 
 def _first(names: Sequence[str], kind: MechanismKind) -> list[str]:
     metrics = registries().metrics
-    return [name for name in names if name in metrics and metrics[name].applies(kind)]
+    return [name for name in names if name in metrics and not metrics[name].refusal(kind, {})]
 
 
 def _objective(kind: MechanismKind) -> str:

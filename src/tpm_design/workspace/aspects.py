@@ -105,8 +105,11 @@ def ray_field(
 def mode_field(mechanism: Mechanism, mode: Mode, *, order: int, sided: bool, floor: float = 0.0) -> RayField:
     """The whole workspace of the mode, by ``order``² rays per square from the origin."""
     rays = ray_set(mode_octants(mode), order)
-    limits = mechanism.reach_radius() / rays.lengths
-    return ray_field(mechanism, mode, rays=rays, limits=limits, sided=sided, floor=floor)
+    half = np.asarray(mechanism.reach_half_axes())
+    radius = float(half.max())
+    x, y, z = (half / radius).tolist()
+    limits = radius / rays.lengths
+    return ray_field(mechanism, mode, rays=rays, limits=limits, sided=sided, floor=floor, scale=(x, y, z))
 
 
 def mode_octants(mode: Mode) -> tuple[Octant, ...]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from tpm_design.arithmetic import Interval, inner, kernel
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
@@ -120,7 +122,7 @@ def _directions(
     """Steps (m) of length ``half`` across the locus, along the determinant's gradient, and along the axes."""
     axes = [(half, 0.0, 0.0), (0.0, half, 0.0), (0.0, 0.0, half)]
     poses = [tuple(p + s * d for p, d in zip(pose, axis, strict=True)) for axis in axes for s in (1.0, -1.0)]
-    values = mechanism.determinants(poses, mode)[part]
+    values = mechanism.determinants_at(np.array(poses), mode)[part]
     slopes = [float(values[2 * k] - values[2 * k + 1]) for k in range(3)]
     size = sum(slope * slope for slope in slopes) ** 0.5
     if size == 0.0:

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
-from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere
+from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere, Tilt
 
 BOX, CYLINDER, ELLIPSOID, POINTS = 0, 1, 2, 3
 
 
 class PlacedRegion(NamedTuple):
-    """A region at its place. ``half``: half edges, (radius, radius, half height) or half axes (m)."""
+    """A region at its place. ``half``: half edges, (radius, radius, half height) or half axes (m). A range
+    of tilts is a cylinder of the coordinates (a, b, d) of ``mechanisms/tilts.py``."""
 
     form: int
     centre: tuple[float, float, float]
@@ -28,6 +29,7 @@ def place(shape: Shape, centre: tuple[float, float, float]) -> PlacedRegion:
     form, half = {
         Box: lambda s: (BOX, tuple(0.5 * edge for edge in s.size)),
         Cylinder: lambda s: (CYLINDER, (s.radius, s.radius, 0.5 * s.height)),
+        Tilt: lambda s: (CYLINDER, (_half_tangent(s.tilt), _half_tangent(s.tilt), 0.5 * s.height)),
         Sphere: lambda s: (ELLIPSOID, (s.radius,) * 3),
         Ellipsoid: lambda s: (ELLIPSOID, s.semi_axes),
         Points: lambda s: (POINTS, tuple(np.abs(np.asarray(s.points)).max(axis=0).tolist())),
@@ -35,6 +37,11 @@ def place(shape: Shape, centre: tuple[float, float, float]) -> PlacedRegion:
     points = np.asarray(shape.points if isinstance(shape, Points) else (), dtype=np.float64).reshape(-1, 3)
     at = (float(centre[0]), float(centre[1]), float(centre[2]))
     return PlacedRegion(form, at, (float(half[0]), float(half[1]), float(half[2])), points + np.asarray(at))
+
+
+def _half_tangent(tilt: float) -> float:
+    """tan(tilt/2), not rounded below it."""
+    return math.nextafter(math.nextafter(math.tan(0.5 * tilt), math.inf), math.inf)
 
 
 @inner

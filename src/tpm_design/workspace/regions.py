@@ -43,16 +43,25 @@ class Points:
     points: tuple[tuple[float, float, float], ...]
 
 
-Shape = Box | Cylinder | Sphere | Ellipsoid | Points
+@dataclass(frozen=True)
+class Tilt:
+    """Every pose tilted by up to ``tilt`` (rad), whichever way, at distances over a height (m)."""
+
+    tilt: float
+    height: float
+
+
+Shape = Box | Cylinder | Sphere | Ellipsoid | Points | Tilt
 
 
 @dataclass(frozen=True)
 class RegionForm:
-    """One kind of region as studies name it."""
+    """One kind of region as studies name it. ``positions``: its poses are positions."""
 
     name: str
     keys: str
     description: str
+    positions: bool = True
 
 
 REGIONS: Mapping[str, RegionForm] = MappingProxyType(
@@ -64,6 +73,12 @@ REGIONS: Mapping[str, RegionForm] = MappingProxyType(
             RegionForm("sphere", "radius", "solid ball"),
             RegionForm("ellipsoid", "semi_axes: [x, y, z]", "solid ellipsoid with these half axes"),
             RegionForm("points", "file: poses.csv", "isolated poses, columns x, y, z, about the centre"),
+            RegionForm(
+                "tilt",
+                "tilt, height, center: {d}",
+                "every tilt up to this one, whichever way, at distances d over this height",
+                positions=False,
+            ),
         )
     }
 )

@@ -69,7 +69,7 @@ def survey(mechanism: Mechanism, mode: Mode, *, order: int) -> Survey:
     )
     along = parts.start[:, None] + (parts.end - parts.start)[:, None] * ALONG
     poses = along[:, :, None] * directions[parts.ray][:, None, :]
-    determinants = mechanism.determinants(poses.reshape(-1, 3), mode)
+    determinants = mechanism.determinants_at(poses.reshape(-1, 3), mode)
     shape = (len(determinants), *along.shape)
     return Survey(poses, _part_pairs(parts.ray, neighbours, len(directions)), determinants.reshape(shape))
 
