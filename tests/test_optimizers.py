@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from tpm_design.errors import RefusedError, UsageError
 from tpm_design.optimizers import OPTIMIZERS, check_pair, optimizer
-from tpm_design.optimizers.base import BudgetSpent, FloatArray, Optimizer, Outcomes
+from tpm_design.optimizers.base import BudgetSpent, FloatArray, Optimizer, Outcomes, Stalled
 from tpm_design.optimizers.refusal import refusal
 from tpm_design.optimizers.watch import DIFFERENCE_STEP, Watch
 
@@ -114,6 +114,8 @@ def searched(method: Optimizer, case: Case, budget: int, seed: int = 1) -> MemoS
         assert sentence.endswith(".")
     except BudgetSpent:
         assert search.spent
+    except Stalled as end:
+        assert str(end).endswith(".")
     return search
 
 

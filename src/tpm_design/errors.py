@@ -47,6 +47,12 @@ class UsageError(TpmDesignError):
     """A command or call that asks for something that is not there."""
 
 
+class RunStoppedError(TpmDesignError):
+    """A run that could not go on, and can be resumed."""
+
+    exit_code = 130
+
+
 class RefusedError(TpmDesignError):
     """A request that cannot work, refused before anything runs."""
 

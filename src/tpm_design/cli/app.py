@@ -47,7 +47,7 @@ def options(
     """Dimensions for translational parallel robots: reachable, well conditioned, far from singularities.
 
     Exit codes: 0 done, 1 internal error, 2 wrong usage or invalid study, 3 no feasible design, 5 requirement
-    refuted or not proved, 130 interrupted.
+    refuted or not proved, 130 interrupted: --resume goes on.
     """
 
 
@@ -151,6 +151,14 @@ def optimize(
     seed: Annotated[int | None, typer.Option(help="Seed of random methods, instead of the study's.")] = None,
     budget: Annotated[int | None, typer.Option(help="Number of evaluations, instead of the study's.")] = None,
     workers: Annotated[int | None, typer.Option(help="Threads; one per processor if left out.")] = None,
+    resume: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RUN|latest",
+            help="Go on in this run folder, or in the study's newest one: after an interruption, a crash, "
+            "a full disk, or with a larger budget.",
+        ),
+    ] = None,
     output: Annotated[Path, typer.Option(metavar="DIR", help="Folder for run folders.")] = Path("results"),
     allow_code: AllowCode = False,
     as_json: Json = False,
@@ -160,7 +168,7 @@ def optimize(
     from tpm_design.cli.commands import optimize_one
 
     return optimize_one(
-        study, seed, budget, workers, output, allow_code=allow_code, as_json=as_json, quiet=quiet
+        study, seed, budget, workers, resume, output, allow_code=allow_code, as_json=as_json, quiet=quiet
     )
 
 

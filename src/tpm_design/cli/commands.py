@@ -6,7 +6,8 @@ import json
 import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from tpm_design.study import (
     template,
 )
 from tpm_design.study.actions import Run, optimize_study, plan_of, pose_values
+from tpm_design.study.resuming import LATEST, check_resumable, run_to_resume
 
 RESULTS = Path("results")
 SWITCH_INTERVAL = 1e-4
@@ -226,6 +228,7 @@ def optimize_one(
     seed: int | None,
     budget: int | None,
     workers: int | None,
+    resume: str | None,
     output: Path,
     *,
     allow_code: bool,
@@ -242,19 +245,21 @@ def optimize_one(
     sys.setswitchinterval(SWITCH_INTERVAL)
     if comparison is None:
         study = load_study(path, allow_code=allow_code).searched_with(seed=seed, budget=budget)
-        run = _searched(study, threads, output, quiet=quiet or as_json)
+        folder = None if resume is None else run_to_resume(study, resume, output)
+        run = _searched(study, threads, output, folder, quiet=quiet or as_json)
         print(json.dumps(_run_data(study, run), ensure_ascii=False) if as_json else _run_text(study, run))
         return _ending(run)
     studies = {
         label: study.searched_with(seed=seed, budget=budget) for label, study in comparison.studies.items()
     }
+    folders = _runs_to_resume(studies, resume, output)
     for study in studies.values():
         check_plan(study.problem, plan_of(study))
     runs = {}
     for label, study in studies.items():
         if not (quiet or as_json):
             print(f"{label}: {study.problem.kind.title}", file=sys.stderr)
-        runs[label] = _searched(study, threads, output, quiet=quiet or as_json)
+        runs[label] = _searched(study, threads, output, folders.get(label), quiet=quiet or as_json)
         if runs[label].result.ending == "interrupted":
             break
     if as_json:
@@ -268,10 +273,31 @@ def optimize_one(
     return worst_code([_ending(run) for run in runs.values()])
 
 
-def _searched(study: Study, workers: int, output: Path, *, quiet: bool) -> Run:
+def _runs_to_resume(studies: Mapping[str, Study], resume: str | None, output: Path) -> dict[str, Path]:
+    """The runs of a comparison that go on, by architecture; those that had not begun are left out."""
+    if resume is None:
+        return {}
+    if resume != LATEST:
+        raise UsageError(
+            "A comparison has a run for each architecture.",
+            where=f"--resume {resume}",
+            remedy=f"Write --resume {LATEST}: the newest of each, or a new one.",
+        )
+    folders = {}
+    for label, study in studies.items():
+        with suppress(UsageError):
+            folders[label] = run_to_resume(study, resume, output)
+    for label, folder in folders.items():
+        check_resumable(studies[label], folder)
+    return folders
+
+
+def _searched(study: Study, workers: int, output: Path, resume: Path | None, *, quiet: bool) -> Run:
     check_plan(study.problem, plan_of(study))
+    if resume is not None:
+        check_resumable(study, resume)
     with search_progress(study.problem, study.units, study.optimizer.budget, quiet=quiet) as watch:
-        return optimize_study(study, workers=workers, output=output, watch=watch)
+        return optimize_study(study, workers=workers, output=output, watch=watch, resume=resume)
 
 
 def _run_data(study: Study, run: Run) -> dict[str, Any]:
@@ -297,7 +323,11 @@ def _run_text(study: Study, run: Run) -> str:
     if run.verdict is not None:
         parts.append(verdict_text(study, run.verdict))
     allow = " --allow-code" if study.plug_in else ""
-    after = [f"Run: {run.folder}", f"Next: tpm-design report {run.folder}{allow}"]
+    after = [f"Run: {run.folder}"]
+    if run.result.ending == "interrupted" and run.folder is not None:
+        after.append(f"Next: tpm-design optimize {run.folder / STUDY} --resume {run.folder}{allow}")
+    else:
+        after.append(f"Next: tpm-design report {run.folder}{allow}")
     lines = [run.status, *run.result.remarks, *after]
     return "\n\n".join([*parts, "\n".join(lines)])
 

@@ -16,6 +16,11 @@ class BudgetSpent(Exception):  # noqa: N818 - an ordinary end of a search, not a
     """Raised by ``Search.evaluate`` when the next point would exceed the budget."""
 
 
+class Stalled(Exception):  # noqa: N818 - an ordinary end of a search, not an error
+    """Raised by ``Optimizer.run`` where the method could not go on before it had converged; the text is the
+    sentence that says why."""
+
+
 @dataclass(frozen=True)
 class Outcomes:
     """Values at N points: ``objective`` (N,) to minimise, ``constraints`` (N, m) met where ≥ 0 (each
@@ -70,7 +75,7 @@ class Abilities:
 @dataclass(frozen=True)
 class Optimizer:
     """One method. ``run(search, seed)`` searches until it converges and returns one sentence on how it
-    ended; BudgetSpent passes through it."""
+    ended; it raises Stalled where it cannot go on before that. BudgetSpent passes through it."""
 
     name: str
     description: str

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer
+from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer, Stalled
 from tpm_design.optimizers.watch import LOCAL_STEP, LOCAL_TOLERANCE, RESTART_DISTANCE, Watch, watched
 
 AGS_CONSTRAINTS = 10
@@ -57,7 +57,7 @@ def _on_objective(opt: Any, watch: Watch) -> None:
 
 
 def _optimize(opt: Any, watch: Watch, *, again: bool = False) -> str:
-    """Runs NLopt; roundoff, forced stop and its plain failure are ordinary ends.
+    """Runs NLopt; roundoff is an ordinary end. Raises Stalled on a forced stop and on its plain failure.
 
     ``again``: from where it ended, as long as that leads elsewhere.
     """
@@ -68,8 +68,10 @@ def _optimize(opt: Any, watch: Watch, *, again: bool = False) -> str:
         nlopt.FTOL_REACHED: "Converged: the value changes no more.",
         nlopt.XTOL_REACHED: "Converged: the step has become negligible.",
         nlopt.ROUNDOFF_LIMITED: "Ended where roundoff hides any further progress.",
+    }
+    stalls = {
         nlopt.FORCED_STOP: "Stopped by the method itself.",
-        nlopt.FAILURE: "Ended: NLopt could not continue from its best point.",
+        nlopt.FAILURE: "NLopt could not continue from its best point.",
     }
     try:
         point = opt.optimize(watch.start)
@@ -77,9 +79,12 @@ def _optimize(opt: Any, watch: Watch, *, again: bool = False) -> str:
             point = further
     except Exception:
         # NLopt raises on ends that are ordinary here, under names that differ between its versions.
-        if opt.last_optimize_result() not in (nlopt.ROUNDOFF_LIMITED, nlopt.FORCED_STOP, nlopt.FAILURE):
+        if opt.last_optimize_result() not in (nlopt.ROUNDOFF_LIMITED, *stalls):
             raise
-    return ends.get(opt.last_optimize_result(), f"Ended with NLopt's code {opt.last_optimize_result()}.")
+    code = opt.last_optimize_result()
+    if code in ends:
+        return ends[code]
+    raise Stalled(stalls.get(code, f"NLopt ended with its code {code}."))
 
 
 def _sampling(algorithm: str, *, constraints: bool, population: Callable[[int], int] | None = None) -> Method:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer
+from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer, Stalled
 from tpm_design.optimizers.watch import LOCAL_STEP, LOCAL_TOLERANCE, RESTART_DISTANCE, Watch, watched
 
 # SciPy's own limits on evaluations and iterations are lifted: the budget belongs to the search. What remains
@@ -246,10 +246,13 @@ def _unit_bounds(watch: Watch) -> list[tuple[float, float]]:
 
 
 def _sentence(result: Any) -> str:
-    """How SciPy says it ended, as one sentence."""
+    """How SciPy says it ended, as one sentence. Raises Stalled with it where SciPy calls that no success."""
     message = result.message
     text = " ".join(str(message[-1] if isinstance(message, list) and message else message).split())
-    return text.rstrip(".") + "."
+    sentence = text.rstrip(".") + "."
+    if not result.success:
+        raise Stalled(sentence)
+    return sentence
 
 
 def _local(*, constraints: bool, derivatives: bool) -> Abilities:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpm_design.optimizers.base import FloatArray, Outcomes, Search
+from tpm_design.optimizers.base import FloatArray, Outcomes, Search, Stalled
 
 LOCAL_STEP = 0.05
 """First step of local methods, as a share of each variable's range: chosen on constrained problems in seven
@@ -30,10 +30,6 @@ share of each variable's range."""
 REPEATS_ALLOWED = 10_000
 """Points in a row that were all known before, after which a search has nothing left to find. Without this a
 method without an end of its own would never stop on a problem with discrete variables only."""
-
-
-class NothingLeft(Exception):  # noqa: N818 - an ordinary end of a search, not an error
-    """The method cannot go on; the text is the sentence that says why."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +67,7 @@ class Watch:
             # + 0.0 turns -0.0 into 0.0: the same point must have the same bits.
             inside: FloatArray = np.clip(np.asarray(points, dtype=np.float64), 0.0, 1.0) + 0.0
             if np.isnan(inside).any():
-                raise NothingLeft("The method broke down: it asked for a point that is not a number.")
+                raise Stalled("The method broke down: it asked for a point that is not a number.")
             self._note(inside)
             return self.search.evaluate(inside)
         except BaseException as reason:
@@ -126,13 +122,13 @@ class Watch:
                 self._known.add(key)
                 self._repeats = 0
         if self._repeats > REPEATS_ALLOWED:
-            raise NothingLeft("Nothing left to try: every further point had been evaluated before.")
+            raise Stalled("Nothing left to try: every further point had been evaluated before.")
 
 
 def watched(method: Callable[[Watch, int], str]) -> Callable[[Search, int], str]:
     """``run`` of an optimiser: ``method`` on a fresh Watch, its first exception passed on.
 
-    BudgetSpent, KeyboardInterrupt and errors of the problem come out as they were raised.
+    BudgetSpent, Stalled, KeyboardInterrupt and errors of the problem come out as they were raised.
     """
 
     def run(search: Search, seed: int) -> str:
@@ -145,8 +141,6 @@ def watched(method: Callable[[Watch, int], str]) -> Callable[[Search, int], str]
                 raise
         if watch.stopped is None:
             return sentence
-        if isinstance(watch.stopped, NothingLeft):
-            return str(watch.stopped)
         raise watch.stopped
 
     return run

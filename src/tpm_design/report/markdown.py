@@ -246,8 +246,10 @@ def _search(reported: Reported) -> list[str]:
     feasible = sum(entry.evaluation.status == "feasible" for entry in entries)
     failed = sum(entry.evaluation.status == "failed" for entry in entries)
     seconds = sum(entry.evaluation.seconds for entry in entries)
-    wall = summary.get("seconds")
-    if isinstance(wall, int | float) and math.isfinite(wall):
+    wall, resumed = summary.get("seconds"), summary.get("resumed_after")
+    if isinstance(resumed, int):
+        time = f"{seconds:.3g} s evaluating (summed over workers); resumed after {resumed} evaluations"
+    elif isinstance(wall, int | float) and math.isfinite(wall):
         time = f"{wall:.3g} s wall time, {seconds:.3g} s of it evaluating (summed over workers)"
     else:
         time = f"{seconds:.3g} s evaluating (summed over workers); the wall time is not known"

@@ -12,11 +12,13 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from tpm_design.errors import UsageError
 from tpm_design.problem import Evaluation, Problem
-from tpm_design.runs.search import Entry
+from tpm_design.runs.durable import AppendedLines, replace_file
+from tpm_design.runs.replay import answers_in
+from tpm_design.runs.search import Entry, design_key
 from tpm_design.runs.tables import EvaluationTable, csv_line, designs_table
 from tpm_design.units import Units
 
@@ -27,6 +29,9 @@ STUDY, TABLE, LOG, DESIGNS, SUMMARY = (
     "designs.csv",
     "run.json",
 )
+UNFINISHED = "unfinished"
+"""``ending`` in run.json from the start of a run until it is over."""
+
 LIBRARIES = ("tpm-design", "numpy", "scipy", "numba", "nlopt", "pandas")
 
 
@@ -52,42 +57,58 @@ def create_run_folder(results: Path, study_name: str, study_hash: str) -> Path:
 
 
 class RunWriter:
-    """Writes a run as it happens. ``record`` flushes one evaluation to both logs."""
+    """Writes a run as it happens. ``record`` hands one evaluation to both logs.
 
-    def __init__(self, folder: Path, problem: Problem, units: Units, study_text: str) -> None:
+    ``stored``: what the log of a run that goes on holds already. The log is only ever appended to, or
+    replaced as a whole. Everything here raises RunStoppedError where a file cannot be written.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        problem: Problem,
+        units: Units,
+        study_text: str,
+        stored: Sequence[Entry] = (),
+    ) -> None:
         self.folder = folder
         self._problem, self._units = problem, units
         self._rows = EvaluationTable(problem, units)
-        (folder / STUDY).write_text(study_text, encoding="utf-8")
-        self._table: TextIO = (folder / TABLE).open("w", encoding="utf-8", newline="")
-        self._log: TextIO = (folder / LOG).open("w", encoding="utf-8")
-        self._table.write(csv_line(self._rows.headings()))
-        self._table.flush()
+        self._stored = frozenset(answers_in(stored))
+        status = "The run is not over, or was cut short; --resume goes on."
+        unfinished = {"status": status, "ending": UNFINISHED, **provenance()}
+        replace_file(folder / STUDY, study_text)
+        replace_file(folder / SUMMARY, _summary_text(unfinished))
+        # what was cut short at its end is gone from here on
+        self._write_logs(stored)
+        self._log, self._table = AppendedLines(folder / LOG), AppendedLines(folder / TABLE)
 
     def record(self, entry: Entry) -> None:
-        """Append one evaluation and hand it to the operating system."""
-        self._log.write(_log_line(entry))
-        self._table.write(csv_line(self._rows.row(entry)))
-        self._log.flush()
-        self._table.flush()
+        """Append one evaluation, unless it is there already, and hand it to the operating system."""
+        if (entry.judged_by, design_key(entry.evaluation.design)) not in self._stored:
+            self._log.append(_log_line(entry))
+            self._table.append(csv_line(self._rows.row(entry)))
+
+    def close(self) -> None:
+        """Leave both logs as they are."""
+        self._log.close()
+        self._table.close()
 
     def finish(self, entries: Sequence[Entry], best: Sequence[Entry], summary: Mapping[str, Any]) -> None:
         """Put both logs in order of ids, complete where a record was interrupted, and write the result."""
-        self._table.close()
-        self._log.close()
-        ordered = sorted(entries, key=lambda entry: entry.number)
-        text = csv_line(self._rows.headings()) + "".join(csv_line(self._rows.row(e)) for e in ordered)
-        _replace(self.folder / TABLE, text)
-        _replace(self.folder / LOG, "".join(map(_log_line, ordered)))
-        _replace(self.folder / DESIGNS, designs_table(self._problem, self._units, best))
-        _replace(self.folder / SUMMARY, json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
+        self.close()
+        self._write_logs(sorted(entries, key=lambda entry: entry.number))
+        replace_file(self.folder / DESIGNS, designs_table(self._problem, self._units, best))
+        replace_file(self.folder / SUMMARY, _summary_text(summary))
+
+    def _write_logs(self, entries: Sequence[Entry]) -> None:
+        text = csv_line(self._rows.headings()) + "".join(csv_line(self._rows.row(e)) for e in entries)
+        replace_file(self.folder / LOG, "".join(map(_log_line, entries)))
+        replace_file(self.folder / TABLE, text)
 
 
-def _replace(path: Path, text: str) -> None:
-    """Write a whole file at once, so that a crash leaves the old one or the new one."""
-    part = path.with_name(path.name + ".part")
-    part.write_text(text, encoding="utf-8")
-    os.replace(part, path)
+def _summary_text(summary: Mapping[str, Any]) -> str:
+    return json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
 
 
 def _log_line(entry: Entry) -> str:
@@ -100,17 +121,19 @@ def entry_to_json(entry: Entry) -> dict[str, Any]:
     data["violation"] = data["violation"] if math.isfinite(data["violation"]) else None
     data["metrics"] = {k: v if math.isfinite(v) else None for k, v in data["metrics"].items()}
     data["errors"] = {k: v if math.isfinite(v) else None for k, v in data["errors"].items()}
-    return {"id": entry.number, "round": entry.round, **data}
+    judged_by = {"judged_by": entry.judged_by} if entry.judged_by else {}
+    return {"id": entry.number, "round": entry.round, **judged_by, **data}
 
 
 def entry_from_json(data: Mapping[str, Any]) -> Entry:
     """The inverse of ``entry_to_json``."""
-    fields = {key: value for key, value in data.items() if key not in ("id", "round")}
+    fields = {key: value for key, value in data.items() if key not in ("id", "round", "judged_by")}
     fields["violation"] = math.inf if fields["violation"] is None else fields["violation"]
     for key in ("metrics", "errors"):
         fields[key] = {k: math.nan if v is None else v for k, v in fields[key].items()}
     fields["pieces"] = {label: tuple(values) for label, values in fields["pieces"].items()}
-    return Entry(int(data["id"]), Evaluation(**fields), int(data.get("round", 1)))
+    round_number, judged_by = int(data.get("round", 1)), str(data.get("judged_by", ""))
+    return Entry(int(data["id"]), Evaluation(**fields), round_number, judged_by)
 
 
 @dataclass(frozen=True)
@@ -128,14 +151,19 @@ class StoredRun:
         return next((entry for entry in self.entries if entry.number == number), None)
 
 
-def read_run(folder: Path) -> StoredRun:
-    """A run from its folder. A last log line that was cut short is ignored. Raises UsageError."""
+def check_is_run(folder: Path) -> None:
+    """Raises UsageError where there is no run in ``folder``."""
     if not (folder / STUDY).is_file() or not (folder / LOG).is_file():
         raise UsageError(
             "This is not a run folder.",
             where=str(folder),
             remedy=f"A run has {STUDY} and {LOG}; `optimize` writes one under results/.",
         )
+
+
+def read_run(folder: Path) -> StoredRun:
+    """A run from its folder. A last log line that was cut short is ignored. Raises UsageError."""
+    check_is_run(folder)
     entries = []
     lines = (folder / LOG).read_text(encoding="utf-8", errors="replace").split("\n")
     for number, line in enumerate(lines, start=1):
@@ -149,9 +177,17 @@ def read_run(folder: Path) -> StoredRun:
             raise UsageError(
                 "This line of the log is damaged.",
                 where=f"{folder / LOG}:{number}",
-                remedy="Restore the run from a copy, or run the study again.",
+                remedy="Remove the line and resume the run: its design is evaluated again.",
             ) from None
-    return StoredRun(folder, tuple(sorted(entries, key=lambda e: e.number)), _read_summary(folder))
+    summary = _read_summary(folder)
+    finished = {} if summary.get("ending") == UNFINISHED else summary
+    return StoredRun(folder, tuple(sorted(entries, key=lambda e: e.number)), finished)
+
+
+def written_by(folder: Path) -> str:
+    """The version of tpm-design that began a run or resumed it last. Raises UsageError."""
+    versions = _read_summary(folder).get("versions", {})
+    return str(versions.get("tpm-design", "of an unknown version"))
 
 
 def _read_summary(folder: Path) -> Mapping[str, Any]:
@@ -165,12 +201,15 @@ def _read_summary(folder: Path) -> Mapping[str, Any]:
     return data if isinstance(data, dict) else {}
 
 
-def newest_run(results: Path) -> Path:
-    """The run folder begun last under ``results``. Raises UsageError where there is none."""
-    found = [path.parent for path in results.glob(f"*/*/{LOG}")]
+def newest_run(results: Path, study_name: str = "*") -> Path:
+    """The run folder begun last under ``results``, of any study or of one. Raises UsageError where there is
+    none."""
+    found = [path.parent for path in results.glob(f"{study_name}/*/{LOG}")]
     if not found:
         raise UsageError(
-            "There is no run here.", where=str(results), remedy="Run `tpm-design optimize STUDY` first."
+            "There is no run here." if study_name == "*" else f"There is no run of {study_name} here.",
+            where=str(results),
+            remedy="Run `tpm-design optimize STUDY` first.",
         )
     return max(found, key=lambda folder: folder.name)
 

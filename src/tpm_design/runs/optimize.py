@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -9,9 +11,10 @@ from tpm_design.certificates.verdict import Verdict
 from tpm_design.design_space import DesignSpace, octant_signs
 from tpm_design.errors import RefusedError
 from tpm_design.optimizers import check_pair, optimizer
-from tpm_design.optimizers.base import BudgetSpent, Optimizer
+from tpm_design.optimizers.base import BudgetSpent, Optimizer, Stalled
 from tpm_design.problem import Goal, Problem, Sample
-from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch
+from tpm_design.runs.replay import answers_in, left_over
+from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch, best_entry
 
 POLISH_SHARE = 0.25
 """Part of the budget kept for polishing. The whole-space search does not know it: a larger budget lets the
@@ -25,6 +28,14 @@ POLISH_ROUND = 20
 
 POLISH_GAIN = 1e-4
 """Relative gain below which a design counts as polished."""
+
+REMEDIES = {
+    "converged": "Another seed may end at a better design.",
+    "budget spent": "Resumed with a larger budget, the search goes on from here.",
+    "stalled": "Try another seed, another method or another start.",
+    "interrupted": "Resume it to go on.",
+}
+"""What to do about each ending where a feasible design was found."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +63,8 @@ class Round:
 @dataclass(frozen=True)
 class SearchResult:
     """The log in order, its best entry, and how it ended. ``ending``: "converged", "budget spent",
-    "interrupted" or, of a search that certifies, "proved" or "not provable" (no round could help).
+    "stalled" (the method could not go on), "interrupted" or, of a search that certifies, "proved" or
+    "not provable" (no round could help).
     ``status``: one or more sentences with what to do where the result is not what was hoped for.
     ``rounds`` and ``verdict`` (on ``best``): of a search that certifies, as far as it came."""
 
@@ -94,23 +106,31 @@ def check_plan(problem: Problem, plan: SearchPlan) -> None:
 
 
 def search(
-    problem: Problem, plan: SearchPlan, *, workers: int, record: Callable[[Entry], None]
+    problem: Problem,
+    plan: SearchPlan,
+    *,
+    workers: int,
+    record: Callable[[Entry], None],
+    stored: Sequence[Entry] = (),
 ) -> SearchResult:
     """Run the plan. ``record`` gets each evaluation as it ends. Raises what ``check_plan`` raises.
 
+    ``stored``: the log of an earlier search for the same problem; what is asked for again is answered from
+    it. What is not, because the budget is another one, comes last and may be the best.
     Ctrl-C ends the search as "interrupted" with everything evaluated so far.
     """
     check_plan(problem, plan)
-    log = EvaluationLog(problem, workers=workers, record=record)
+    log = EvaluationLog(problem, workers=workers, record=record, answers=answers_in(stored))
     try:
         ending, detail = search_all(log, plan, plan.budget)
     except KeyboardInterrupt:
         ending, detail = "interrupted", "The search was interrupted."
     finally:
         log.close()
-    best = log.best()
-    status = status_sentence(problem, best, len(log.entries), detail)
-    return SearchResult(tuple(log.entries), best, ending, status, remarks_on(plan, problem))
+    entries = (*log.entries, *left_over(stored, log.entries))
+    best = best_entry(problem, entries)
+    status = status_sentence(problem, best, entries, ending, detail)
+    return SearchResult(entries, best, ending, status, remarks_on(plan, problem))
 
 
 def view_of(log: EvaluationLog, limit: int) -> UnitSearch:
@@ -126,7 +146,9 @@ def search_all(log: EvaluationLog, plan: SearchPlan, limit: int) -> tuple[str, s
     whole = view_of(log, max(1, limit - kept))
     ending, detail = run_method(optimizer(plan.method), whole, plan.seed)
     if plan.polish is not None:
-        ending, detail = polish_best(optimizer(plan.polish), whole, limit, plan.seed)
+        polished, said = polish_best(optimizer(plan.polish), whole, limit, plan.seed)
+        if ending != "stalled" or polished == "budget spent":
+            ending, detail = polished, said
     return ending, detail
 
 
@@ -135,6 +157,10 @@ def run_method(method: Optimizer, view: UnitSearch, seed: int) -> tuple[str, str
         return "converged", method.run(view, seed)
     except BudgetSpent:
         return "budget spent", "The budget was spent."
+    except Stalled as end:
+        if all(view.levels) and len(view.log.entries) == math.prod(view.levels):
+            return "converged", "Every design was evaluated."
+        return "stalled", f"The search stalled: {end}"
 
 
 def polish_best(
@@ -206,17 +232,36 @@ def binding(problem: Problem, best: Entry) -> tuple[Goal, float] | None:
     return goal, slack
 
 
-def status_sentence(problem: Problem, best: Entry | None, count: int, detail: str) -> str:
-    """How the search ended (``detail`` first, if any), with a remedy where nothing feasible was found."""
+def status_sentence(
+    problem: Problem, best: Entry | None, entries: Sequence[Entry], ending: str, detail: str
+) -> str:
+    """How the search ended (``detail`` first, if any) and what it found, each with what to do about it."""
+    count = len(entries)
     if best is None:
         return f"{detail} No design was evaluated."
-    if best.evaluation.status == "feasible":
-        return f"{detail} Best feasible design of {count} evaluations: number {best.number}."
     if best.evaluation.status == "failed":
-        return f"{detail} None of {count} designs could be evaluated: {best.evaluation.reason}"
+        reason = best.evaluation.reason.rstrip(".")
+        return f"{detail} None of {count} designs could be evaluated: {reason}. Change the ranges."
+    remedy = REMEDIES.get(ending, "")
+    if best.evaluation.status == "feasible":
+        found = f"Best feasible design of {count} evaluations: number {best.number}."
+        return " ".join(filter(None, [detail, remedy, found, *_failures(entries)]))
     limit = binding(problem, best)
     label = limit[0].label if limit else "the objective"
-    return (
-        f"{detail} No feasible design in {count} evaluations; the closest misses {label} (violation "
+    found = (
+        f"No feasible design in {count} evaluations; the closest misses {label} (violation "
         f"{best.evaluation.violation:.3g}). Widen the ranges, relax {label} or raise the budget."
     )
+    told = [detail, remedy if ending == "interrupted" else "", found, *_failures(entries)]
+    return " ".join(filter(None, told))
+
+
+def _failures(entries: Sequence[Entry]) -> list[str]:
+    """A sentence on designs that could not be evaluated, if there are any."""
+    reasons = Counter(e.evaluation.reason.rstrip(".") for e in entries if e.evaluation.status == "failed")
+    if not reasons:
+        return []
+    ((most, times),) = reasons.most_common(1)
+    failed = sum(reasons.values())
+    why = f"{most}" if times == failed else f"{times} of them: {most}"
+    return [f"{failed} of {len(entries)} designs could not be evaluated ({why}); narrower ranges avoid them."]

@@ -27,7 +27,8 @@ from tpm_design.runs.optimize import (
     status_sentence,
     view_of,
 )
-from tpm_design.runs.search import Entry, EvaluationLog, best_entry, rank
+from tpm_design.runs.replay import answers_in, left_over
+from tpm_design.runs.search import Answers, Entry, EvaluationLog, best_entry, rank
 from tpm_design.workspace.region_geometry import nearest_pose
 
 FIRST_SHARE = 0.8
@@ -63,26 +64,33 @@ def search_certified(
     *,
     workers: int,
     record: Callable[[Entry], None],
+    stored: Sequence[Entry] = (),
 ) -> SearchResult:
     """Search and certify in rounds, until the best design is proved, no round can help or the budget ends.
 
     A feasible design of a later round holds at every counterexample found before it. Where a round finds no
     such design the best one of the round before remains, with its verdict. Raises what ``check_plan`` raises;
     Ctrl-C ends the search as "interrupted" with everything evaluated so far.
+
+    ``stored``: the log of an earlier search for the same problem; a design that is asked for again and judged
+    by the same samples is answered from it, verdicts are found anew. With another budget the rounds are
+    other ones: what they do not ask for is dropped at the end.
     """
     check_plan(problem, plan)
-    course = _Course(problem, plan, proving, workers, record)
+    course = _Course(problem, plan, proving, workers, record, answers_in(stored))
     try:
         ending, detail = course.run()
     except KeyboardInterrupt:
         course.interrupted()
         ending, detail = "interrupted", "The search was interrupted."
-    best = best_entry(problem, course.entries)
+    rest = left_over(stored, course.entries) if ending == "interrupted" else []
+    entries = (*course.entries, *rest)
+    best = best_entry(problem, entries)
     found = None if best is None else course.verdicts.get(best.number)
-    status = status_sentence(problem, best, len(course.entries), detail)
+    status = status_sentence(problem, best, entries, ending, detail)
     told = " ".join([status, *_told(course.rounds, found, proving)])
     return SearchResult(
-        tuple(course.entries),
+        entries,
         best,
         ending,
         told.strip(),
@@ -102,9 +110,10 @@ class _Course:
         proving: Proving,
         workers: int,
         record: Callable[[Entry], None],
+        answers: Answers,
     ) -> None:
         self._problem, self._plan, self._proving, self._workers = problem, plan, proving, workers
-        self._record = record
+        self._record, self._answers = record, answers
         self._samples: tuple[Sample, ...] = ()
         self._first = 0
         self.entries: list[Entry] = []
@@ -155,6 +164,7 @@ class _Course:
             record=self._record,
             first=self._first,
             round_number=len(self.rounds) + 1,
+            answers=self._answers,
         )
         try:
             if not self.rounds:

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.design_space import DesignSpace
 from tpm_design.optimizers.base import BudgetSpent, Outcomes
-from tpm_design.problem import Design, Evaluation, Goal, Problem, evaluate
+from tpm_design.problem import Design, Evaluation, Goal, Problem, Sample, evaluate
 
 FloatArray = NDArray[np.float64]
 Key = tuple[float | str, ...]
+
+Answers = Mapping[tuple[str, Key], Evaluation]
+"""Evaluations by what a design was judged by (as in ``Entry``) and the design's key."""
 
 PENALTY = 1e3
 """Weight of the violation in the merit of methods without constraints: above the multipliers that
@@ -32,17 +38,20 @@ FAILED = 1e6
 @dataclass(frozen=True)
 class Entry:
     """One evaluation in the log, numbered from 0 in the order in which points were asked for. ``round``: from
-    1; each further one judges designs by more samples than those before."""
+    1; each further one judges designs by more samples than those before. ``judged_by``: ``samples_digest``
+    of these samples."""
 
     number: int
     evaluation: Evaluation
     round: int = 1
+    judged_by: str = ""
 
 
 class EvaluationLog:
     """Every distinct design evaluated so far in one round. The one place that counts evaluations.
 
     ``record`` is called with each entry, in order, as soon as it is there. ``first``: number of the first.
+    ``answers``: evaluations that need not be repeated; they count like others.
     """
 
     def __init__(
@@ -53,8 +62,11 @@ class EvaluationLog:
         record: Callable[[Entry], None] = lambda entry: None,
         first: int = 0,
         round_number: int = 1,
+        answers: Answers = MappingProxyType({}),
     ) -> None:
         self.problem = problem
+        self.judged_by = samples_digest(problem.samples)
+        self._answers = answers
         self.first = first
         self.round_number = round_number
         self.entries: list[Entry] = []
@@ -81,16 +93,18 @@ class EvaluationLog:
         allowed = max(0, limit - len(self.entries))
         wanted = list(fresh.items())[:allowed]
         run = map if self._pool is None else self._pool.map
-        for (key, _), result in zip(
-            wanted, run(lambda item: evaluate(self.problem, item[1]), wanted), strict=True
-        ):
+        for (key, _), result in zip(wanted, run(self._evaluation, wanted), strict=True):
             self._places[key] = len(self.entries)
-            entry = Entry(self.first + len(self.entries), result, self.round_number)
+            entry = Entry(self.first + len(self.entries), result, self.round_number, self.judged_by)
             self.entries.append(entry)
             self._record(entry)
         if len(wanted) < len(fresh):
             raise BudgetSpent
         return [self.entries[self._places[key]].evaluation for key in keys]
+
+    def _evaluation(self, item: tuple[Key, Design]) -> Evaluation:
+        key, design = item
+        return self._answers.get((self.judged_by, key)) or evaluate(self.problem, design)
 
     def best(self) -> Entry | None:
         """As ``best_entry``."""
@@ -161,6 +175,14 @@ def best_entry(problem: Problem, entries: Iterable[Entry]) -> Entry | None:
 def design_key(design: Design) -> Key:
     """Exact identity of a design."""
     return tuple(design[name] for name in sorted(design))
+
+
+def samples_digest(samples: Sequence[Sample]) -> str:
+    """What tells samples apart, by their exact numbers; empty where there are none."""
+    if not samples:
+        return ""
+    text = json.dumps([asdict(sample) for sample in samples], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def minimised(problem: Problem, evaluation: Evaluation) -> float:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,13 +15,15 @@ from tpm_design.certificates.document import document, write_document
 from tpm_design.certificates.verdict import Verdict
 from tpm_design.errors import UsageError, did_you_mean
 from tpm_design.problem import Design, Evaluation, evaluate, with_ties
-from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, text_hash
+from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run, text_hash
+from tpm_design.runs.lock import sole_writer
 from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, search
 from tpm_design.runs.rounds import Proving, search_certified
 from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import EvaluationTable, csv_line
 from tpm_design.study.design import choose_design, tied_error
 from tpm_design.study.plain import dump_yaml
+from tpm_design.study.resuming import check_resumable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,33 +71,64 @@ def optimize_study(
     workers: int,
     output: Path | None,
     watch: Callable[[Entry], None] = lambda entry: None,
+    resume: Path | None = None,
 ) -> Run:
     """Search the study's design space; with ``output`` the run is written below it as it happens.
 
-    ``watch`` sees each evaluation. Raises RefusedError or UsageError before anything runs.
+    ``watch`` sees each evaluation. ``resume``: a run folder to go on in instead of a new one. Raises
+    RefusedError or UsageError before anything runs, RunStoppedError where the run cannot be written.
     """
     plan = plan_of(study)
     check_plan(study.problem, plan)
-    folder = writer = None
-    study_text = dump_yaml(study.resolved())
-    if output is not None:
+    if resume is not None:
+        check_resumable(study, resume)
+    folder = resume
+    if folder is None and output is not None:
         folder = create_run_folder(output, study.name, study.study_hash)
-        if study.plug_in is not None:
-            study.plug_in.write_beside(folder / STUDY)
-        writer = RunWriter(folder, study.problem, study.units, study_text)
-
-    def record(entry: Entry) -> None:
-        if writer is not None:
-            writer.record(entry)
-        watch(entry)
-
-    began = time.perf_counter()
-    if study.certification is None:
-        result = search(study.problem, plan, workers=workers, record=record)
+    if folder is None:
+        result = _searched(study, plan, workers, watch, ())
     else:
-        proving = Proving(study.certification.tolerance, study.certification.boxes)
-        result = search_certified(study.problem, plan, proving, workers=workers, record=record)
-    if writer is not None and folder is not None:
+        with sole_writer(folder):
+            stored = None
+            if resume is not None:
+                # only now can nobody else write to it
+                check_resumable(study, folder)
+                stored = read_run(folder).entries
+            result = _written(study, plan, workers, watch, folder, stored)
+    best = None if result.best is None else result.best.evaluation
+    table = evaluations_frame(study, result.entries)
+    return Run(best, table, result.status, result, folder, result.verdict)
+
+
+def _searched(
+    study: Study, plan: SearchPlan, workers: int, record: Callable[[Entry], None], stored: Sequence[Entry]
+) -> SearchResult:
+    if study.certification is None:
+        return search(study.problem, plan, workers=workers, record=record, stored=stored)
+    proving = Proving(study.certification.tolerance, study.certification.boxes)
+    return search_certified(study.problem, plan, proving, workers=workers, record=record, stored=stored)
+
+
+def _written(
+    study: Study,
+    plan: SearchPlan,
+    workers: int,
+    watch: Callable[[Entry], None],
+    folder: Path,
+    stored: tuple[Entry, ...] | None,
+) -> SearchResult:
+    """A search that is written to its folder as it happens. ``stored``: what a resumed run holds already."""
+    began = time.perf_counter()
+    study_text = dump_yaml(study.resolved())
+    if study.plug_in is not None:
+        study.plug_in.write_beside(folder / STUDY)
+    with closing(RunWriter(folder, study.problem, study.units, study_text, stored or ())) as writer:
+
+        def record(entry: Entry) -> None:
+            writer.record(entry)
+            watch(entry)
+
+        result = _searched(study, plan, workers, record, stored or ())
         if result.verdict is not None:
             data = document(study.problem, study.resolved(), study.study_hash, result.verdict)
             write_document(folder / CERTIFICATE, data)
@@ -114,12 +148,11 @@ def optimize_study(
             "study_hash": study.study_hash,
             "study_file_hash": text_hash(study_text),
             **provenance(),
+            **({} if stored is None else {"resumed_after": len(stored)}),
             "seconds": round(time.perf_counter() - began, 3),
         }
         writer.finish(result.entries, [result.best] if result.best else [], summary)
-    best = None if result.best is None else result.best.evaluation
-    table = evaluations_frame(study, result.entries)
-    return Run(best, table, result.status, result, folder, result.verdict)
+    return result
 
 
 def _rounds_data(result: SearchResult) -> dict[str, Any]:

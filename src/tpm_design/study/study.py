@@ -82,17 +82,24 @@ class Study:
         budget: int | None = None,
         workers: int = 1,
         output: str | Path | None = None,
+        resume: str | Path | None = None,
     ) -> Run:
         """Search the design space; a run folder is written below ``output`` if that is given.
 
-        Raises RefusedError where the method cannot search this problem, UsageError on bad arguments.
+        ``resume``: a run folder of this study that was cut short, or is to get a larger budget, or "latest",
+        the newest one below ``output``. It is written on and ends as if it had never been cut short.
+        Raises RefusedError where the method cannot search this problem, UsageError on bad arguments and runs
+        of another study or version, RunStoppedError where the run folder cannot be written.
         """
         from tpm_design.study.actions import optimize_study
+        from tpm_design.study.resuming import run_to_resume
 
         if workers < 1:
             raise UsageError(f"{workers} workers cannot work", remedy="Choose a whole number from 1.")
         study = self.searched_with(seed=seed, budget=budget)
-        return optimize_study(study, workers=workers, output=None if output is None else Path(output))
+        below = None if output is None else Path(output)
+        folder = None if resume is None else run_to_resume(study, resume, below)
+        return optimize_study(study, workers=workers, output=below, resume=folder)
 
     def searched_with(self, *, seed: int | None = None, budget: int | None = None) -> Study:
         """The same study with another seed or budget. Raises UsageError for values a study cannot have."""
