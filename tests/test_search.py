@@ -14,7 +14,7 @@ from tpm_design.errors import RefusedError
 from tpm_design.optimizers.base import BudgetSpent
 from tpm_design.problem import Accuracy, Problem, Variable, evaluate
 from tpm_design.runs.optimize import SearchPlan, SearchResult, search
-from tpm_design.runs.search import EvaluationLog, UnitSearch
+from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch
 from tpm_design.study import load_study
 
 STUDIES = Path(__file__).parents[1] / "studies"
@@ -70,6 +70,20 @@ def test_a_larger_budget_goes_on_where_a_smaller_one_ended(cube: Problem) -> Non
     assert len(short.entries) == 60
     assert len(long.entries) == 120
     assert [e.evaluation.design for e in long.entries[:60]] == [e.evaluation.design for e in short.entries]
+
+
+def test_an_interruption_of_the_replay_loses_nothing(cube: Problem) -> None:
+    plan = SearchPlan("scipy.differential_evolution", 60, 3, None)
+    stored = run(cube, plan).entries
+
+    def interrupt(entry: Entry) -> None:
+        if entry.number == 30:
+            raise KeyboardInterrupt
+
+    again = search(cube, plan, workers=1, record=interrupt, stored=stored[:50])
+    assert again.ending == "interrupted"
+    assert again.entries == stored[:50]
+    assert search(cube, plan, workers=1, record=lambda entry: None, stored=again.entries).best is not None
 
 
 def test_repeated_designs_cost_nothing_and_the_budget_is_exact(cube: Problem) -> None:
@@ -146,3 +160,77 @@ def test_what_cannot_work_is_refused_before_anything_runs(cube: Problem) -> None
         run(replace(cube, objectives=cube.objectives * 2), SearchPlan("nlopt.isres", 10, 1, None))
     with pytest.raises(RefusedError, match="free"):
         run(replace(cube, variables=()), SearchPlan("nlopt.isres", 10, 1, None))
+
+
+# ------------------------------------------------------------------------------------- how it ended
+
+
+@pytest.fixture(scope="module")
+def links(cube: Problem) -> Problem:
+    """Two lengths and what takes no time to measure."""
+    free = [v for v in cube.variables if v.name in ("f", "r")]
+    rest = {"db": 0.2, "k": 1.0, "center_x": 0.155, "center_y": 0.155, "center_z": 0.155}
+    goals = {g.label: g for g in cube.constraints}
+    return replace(
+        cube,
+        variables=tuple(free),
+        fixed={**cube.fixed, **rest},
+        constraints=(goals["conditioning_min"],),
+        accuracy=Accuracy(1e-3, 3),
+    )
+
+
+def test_a_converged_search_says_so_and_what_else_could_be_tried(links: Problem) -> None:
+    for method in ("scipy.cobyla", "nlopt.slsqp"):
+        result = run(links, SearchPlan(method, 1000, 1, None), workers=1)
+        assert result.ending == "converged"
+        assert len(result.entries) < 1000
+        assert result.status.startswith("Converged: ")
+        assert "Another seed or start" in result.status
+
+
+def test_a_spent_budget_says_that_a_larger_one_goes_on(links: Problem) -> None:
+    result = run(links, SearchPlan("nlopt.isres", 30, 1, None), workers=1)
+    assert result.ending == "budget spent"
+    assert result.status.startswith("The budget was spent. Resumed with a larger budget, ")
+
+
+def test_a_method_that_goes_round_in_circles_has_stalled(links: Problem) -> None:
+    """COBYLA at a kink of 1/κ, far from the 1.917 m that others find from the same start."""
+    result = run(links, SearchPlan("nlopt.cobyla", 1000, 1, None), workers=1)
+    assert result.ending == "stalled"
+    assert result.status.startswith("The search stalled: ")
+    assert "another method" in result.status
+
+
+def test_a_method_that_could_not_go_on_has_stalled(links: Problem) -> None:
+    """1/κ is never above 1: SLSQP finds its constraints incompatible."""
+    (goal,) = links.constraints
+    impossible = replace(links, constraints=(replace(goal, minimum=3.0),))
+    result = run(impossible, SearchPlan("scipy.slsqp", 1000, 1, None), workers=1)
+    assert result.ending == "stalled"
+    assert result.status.startswith("The search stalled: ")
+    assert "the closest misses conditioning_min" in result.status
+    assert "relax conditioning_min" in result.status
+
+
+def test_when_every_design_was_evaluated_the_search_has_converged(links: Problem) -> None:
+    listed = tuple(replace(v, values=(0.25, 0.3, 0.35)) for v in links.variables)
+    result = run(replace(links, variables=listed), SearchPlan("nlopt.direct_l", 1000, 1, None), workers=1)
+    assert len(result.entries) == 9
+    assert result.ending == "converged"
+    assert result.status.startswith("Converged: every design was evaluated.")
+
+
+def test_designs_that_fail_are_counted_with_their_reason(links: Problem) -> None:
+    longer = tuple(replace(v, lower=-0.2) if v.name == "f" else v for v in links.variables)
+    result = run(replace(links, variables=longer), SearchPlan("nlopt.isres", 60, 1, None), workers=1)
+    failed = [e.evaluation for e in result.entries if e.evaluation.status == "failed"]
+    assert 5 < len(failed) < 55
+    assert f"{len(failed)} of 60 designs could not be evaluated (" in result.status
+    assert "not positive" in result.status
+    assert "narrower ranges" in result.status
+    hopeless = tuple(replace(v, lower=-0.2, upper=-0.1) if v.name == "f" else v for v in links.variables)
+    result = run(replace(links, variables=hopeless), SearchPlan("nlopt.isres", 10, 1, None), workers=1)
+    assert "None of 10 designs could be evaluated: " in result.status
+    assert result.status.endswith("not positive. Change the ranges.")

@@ -29,9 +29,18 @@ from tpm_design.runs.lock import FILE as LOCK
 from tpm_design.runs.lock import sole_writer
 from tpm_design.runs.optimize import POLISH_SHARE
 
-POLISHED = STUDY.replace("budget: 60, seed: 1", "budget: 160, seed: 1, polish: nlopt.cobyla").replace(
-    "conditioning_min, min: 0.2", "conditioning_min, label: 1/κ of motors, min: 0.2"
-)
+# quick to evaluate, and with rows that are not ASCII
+POLISHED = STUDY
+for old, new in (
+    ("budget: 60, seed: 1", "budget: 160, seed: 1, polish: nlopt.cobyla"),
+    ("{metric: conditioning_min, min", "{metric: conditioning_min, label: 1/κ of motors, min"),
+    ("{metric: coverage, min: 1}", "{metric: singularity_margin_min, min: 0.01}"),
+    ("{metric: rotation_singularity_distance, min: 20}", "{metric: robot_size, max: 700}"),
+    ("record: [{metric: velocity_max}]", "accuracy: {region_samples: 5}"),
+):
+    assert old in POLISHED
+    POLISHED = POLISHED.replace(old, new)
+
 CERTIFIED = """\
 version: 1
 name: proved
@@ -104,8 +113,7 @@ def cut(run: Path, length: int) -> None:
 def test_a_search_killed_twenty_times_ends_as_if_it_had_not_been(whole: Path, tmp_path: Path) -> None:
     program = Path(__file__).with_name("killed.py")
     words = [sys.executable, program, written(tmp_path, POLISHED), tmp_path / "results", "20", "1"]
-    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=True)
-    assert done.stdout == "20\n"
+    subprocess.run([str(word) for word in words], check=True)
     again = only_run(tmp_path)
     assert contents(again) == contents(whole)
     assert {path.name for path in again.iterdir()} == {path.name for path in whole.iterdir()}
@@ -124,10 +132,10 @@ def started(*words: str | Path, run: Callable[[], list[Path]], rows: int) -> sub
 
 
 @posix
-def test_after_ctrl_c_the_command_that_is_printed_goes_on(whole: Path, tmp_path: Path) -> None:
-    results = tmp_path / "results"
+def test_after_ctrl_c_the_command_that_is_printed_goes_on(tmp_path: Path) -> None:
+    results, study = tmp_path / "results", written(tmp_path, STUDY)
     search = started(
-        *("optimize", written(tmp_path, POLISHED), "--workers", "2", "--output", results),
+        *("optimize", study, "--budget", "150", "--seed", "5", "--output", results),
         run=lambda: list(results.glob("*/*/evaluations.jsonl")),
         rows=20,
     )
@@ -136,8 +144,10 @@ def test_after_ctrl_c_the_command_that_is_printed_goes_on(whole: Path, tmp_path:
     assert search.returncode == 130
     (following,) = re.findall(r"^Next: tpm-design (optimize .*)$", output, re.MULTILINE)
     outcome = tpm_design(*shlex.split(following))
-    assert (outcome.code, "Best feasible design of 160 evaluations" in outcome.output) == (0, True)
-    assert contents(only_run(tmp_path)) == contents(whole)
+    assert (outcome.code, "Best feasible design of 150 evaluations" in outcome.output) == (0, True)
+    whole = tpm.load_study(study).optimize(seed=5, budget=150, output=tmp_path)
+    assert whole.folder is not None
+    assert contents(only_run(tmp_path)) == contents(whole.folder)
 
 
 @posix
@@ -286,7 +296,7 @@ def test_a_finished_run_is_written_again_as_it_is(run: Path, whole: Path) -> Non
             assert (run / name).read_bytes() == (whole / name).read_bytes()
 
 
-@pytest.mark.parametrize("share", [0.4, 0.85, 0.97])
+@pytest.mark.parametrize("share", [0.4, 0.95])
 def test_rounds_are_resumed_with_their_samples_and_proofs(share: float, proved: Path, tmp_path: Path) -> None:
     run = shutil.copytree(proved, tmp_path / "run")
     entries = read_run(proved).entries
@@ -360,10 +370,10 @@ def test_what_a_former_polish_found_is_not_lost_with_a_larger_budget(run: Path, 
         ("seed: 1", "seed: 2", "optimizer.seed"),
         ("polish: nlopt.cobyla", "polish: nlopt.sbplx", "optimizer.polish"),
         (", polish: nlopt.cobyla", "", "optimizer.polish"),
-        ("min: 20}", "min: 21}", "constraints[3].min"),
+        ("max: 700}", "max: 701}", "constraints[3].max"),
         ("size: [70, 70, 70]", "size: [70, 70, 71]", "region.size[3]"),
-        ("record:", "accuracy: {region_samples: 11}\nrecord:", "accuracy.region_samples"),
-        ("record: [{metric: velocity_max}]", "record: []", "record"),
+        ("region_samples: 5", "region_samples: 6", "accuracy.region_samples"),
+        ("optimizer:", "record: [{metric: velocity_max}]\noptimizer:", "record"),
     ],
 )
 def test_another_study_is_refused_and_the_difference_named(

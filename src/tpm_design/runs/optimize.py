@@ -30,7 +30,7 @@ POLISH_GAIN = 1e-4
 """Relative gain below which a design counts as polished."""
 
 REMEDIES = {
-    "converged": "Another seed may end at a better design.",
+    "converged": "Another seed or start may end at a better design.",
     "budget spent": "Resumed with a larger budget, the search goes on from here.",
     "stalled": "Try another seed, another method or another start.",
     "interrupted": "Resume it to go on.",
@@ -154,12 +154,13 @@ def search_all(log: EvaluationLog, plan: SearchPlan, limit: int) -> tuple[str, s
 
 def run_method(method: Optimizer, view: UnitSearch, seed: int) -> tuple[str, str]:
     try:
-        return "converged", method.run(view, seed)
+        said = method.run(view, seed)
+        return "converged", said if said.startswith("Converged") else f"Converged: {said}"
     except BudgetSpent:
         return "budget spent", "The budget was spent."
     except Stalled as end:
         if all(view.levels) and len(view.log.entries) == math.prod(view.levels):
-            return "converged", "Every design was evaluated."
+            return "converged", "Converged: every design was evaluated."
         return "stalled", f"The search stalled: {end}"
 
 
