@@ -201,6 +201,8 @@ def test_a_method_that_goes_round_in_circles_has_stalled(links: Problem) -> None
     assert result.ending == "stalled"
     assert result.status.startswith("The search stalled: ")
     assert "another method" in result.status
+    # a polish that converges does not hide it
+    assert run(links, SearchPlan("nlopt.cobyla", 1000, 1, "scipy.cobyla"), workers=1).ending == "stalled"
 
 
 def test_a_method_that_could_not_go_on_has_stalled(links: Problem) -> None:

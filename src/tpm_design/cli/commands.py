@@ -270,6 +270,8 @@ def optimize_one(
     table_file = write_comparison(output, comparison.name, studies, runs)
     if not as_json:
         print(f"Table: {table_file}")
+        if any(run.result.ending == "interrupted" for run in runs.values()):
+            print(f"Next: the same command with --resume {LATEST}")
     return worst_code([_ending(run) for run in runs.values()])
 
 

@@ -26,6 +26,17 @@ def replace_file(path: Path, text: str) -> None:
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise run_stopped(path, error) from None
+    _sync_names(path.parent)
+
+
+def _sync_names(folder: Path) -> None:
+    """Force the names in a folder to the disk, where the operating system has such a thing."""
+    with suppress(OSError):
+        names = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(names)
+        finally:
+            os.close(names)
 
 
 class AppendedLines:
