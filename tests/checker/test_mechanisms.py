@@ -436,7 +436,7 @@ def test_parameters_limits_and_modes_are_those_of_the_package(name: str) -> None
 def test_limits_are_those_of_the_package(name: str) -> None:
     random = np.random.default_rng(9)
     told = {True: 0, False: 0}
-    for _ in range(12):
+    for _ in range(7):
         free = random_case(name, random)
         limits: dict[str, Any] = {}
         for limit, form in MECHANISMS[name].limits.items():
@@ -460,14 +460,14 @@ def test_limits_are_those_of_the_package(name: str) -> None:
 def test_what_is_proved_on_a_box_holds_at_poses_and_machines_within(name: str) -> None:
     random = np.random.default_rng(6)
     proofs = dict.fromkeys(STATEMENTS, 0)
-    for _ in range(12):
+    for _ in range(8):
         machine, plain, poses = random_case(name, random)
         values = metrics_at(name, plain, poses[0])._asdict()
         machines = machine.within_tolerance()
         half = float(random.choice([1e-3, 4e-3]))
         others = [
             metrics_at(name, closures.Machine(name, moved(machine, random), plain.signs), pose)._asdict()
-            for pose in poses[0] + half * random.uniform(-1, 1, (12, 3))
+            for pose in poses[0] + half * random.uniform(-1, 1, (8, 3))
         ]
         for title, value in values.items():
             rising = title not in ("fastest", "sensitivity")
