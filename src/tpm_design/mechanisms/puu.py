@@ -533,12 +533,12 @@ REMARKS = (
     "The paper gives no L and no convention for the U-joint angle, so that its workspace figures (d from 31 "
     "to 142 mm, β up to 78°, 60.4° all round at d = 94 mm) can be approached, not reproduced.",
     "Its worked examples belong to h = 78.2843 mm, its workspace section to h = (R − r) tan θ = 70 mm: the "
-    "parameter o, 0 by default, is the difference, the height of P over the joints B_i.",
+    "parameter o, 0 by default, is the difference, the height of the joints B_i over P.",
     "Its direction of the rotation axis, n × Z, contradicts its components, Z × n, which are used; the minus "
     "sign in its second component of B_i breaks the symmetry it relies on and is left out.",
-    "Its condition of the second kind, b_i × L_i = 0, is not the one: `actuation` is the determinant of the "
+    "Its condition of the second kind, b_i × L_i = 0, is not the one: actuation is the determinant of the "
     "carriages' speeds against the three motions there are.",
-    "There are singularities inside the workspace that it claims: for θ = 45° the `rotation` locus at "
+    "There are singularities inside the workspace that it claims: for θ = 45° the rotation locus at "
     "β = 67.38° towards α = 90° and 74.17° towards α = 0°, whatever d and L.",
     "Poses with β = 0 have no α: give any; the Jacobian does not exist there. Tilts up to 120° are "
     "considered. Where d < h two poses share (α, β, d): the one with l + h cos(β/2) ≥ 0 is meant.",
