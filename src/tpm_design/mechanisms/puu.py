@@ -315,6 +315,12 @@ def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
+@formula(equations.length_error_gains, PuuGeometry)
+def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """There are none where poses are not positions: metrics of them are refused."""
+    return math.nan, math.nan, math.nan
+
+
 @formula(equations.limb_parameters, PuuGeometry)
 def _limb_parameters(geometry, limb):  # type: ignore[no-untyped-def]
     """The strut: no limb has parameters of its own, or the platform would turn otherwise."""
