@@ -83,7 +83,10 @@ units: {length: mm, angle: deg}
 architectures:
   glide: {mechanism: {type: orthoglide, parameters: {L: {min: 100, max: 400}}, mode: {carriages: "+++"}}}
   towers:
-    mechanism: {type: linear_delta, parameters: {R: 150, r: 40, l: {min: 200, max: 300}, rail: 500}, mode: {carriages: "+++"}}
+    mechanism:
+      type: linear_delta
+      parameters: {R: 150, r: 40, l: {min: 200, max: 300}, rail: 500}
+      mode: {carriages: "+++"}
     region: {type: sphere, radius: 30, center: [0, 0, -400]}
 region: {type: sphere, radius: 30, center: [0, 0, 0]}
 objectives: [{metric: total_link_length, sense: minimize}]
@@ -114,8 +117,8 @@ def test_a_comparison_is_a_study_for_each_architecture(tmp_path: Path) -> None:
         ),
         ("  glide: {mechanism:", "  glide: {mechanisms:", r":5: 'mechanisms' is no part of a study"),
         ("type: orthoglide", "type: orthoglid", r":5: there is no mechanism 'orthoglid'"),
-        ("    region: {type: sphere, radius: 30", "    region: {type: sphere, radius: -30", r":8: .*radius"),
-        ("{metric: coverage, min: 1}", "{metric: covrage, min: 1}", r":11: there is no metric 'covrage'"),
+        ("    region: {type: sphere, radius: 30", "    region: {type: sphere, radius: -30", r":11: .*radius"),
+        ("{metric: coverage, min: 1}", "{metric: covrage, min: 1}", r":14: there is no metric 'covrage'"),
     ],
 )
 def test_what_is_wrong_in_a_comparison_is_told_with_its_line(
