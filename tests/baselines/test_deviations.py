@@ -82,7 +82,8 @@ def test_a_numeric_error_is_measured_by_its_metric() -> None:
     before, now = table(ROW), table(changed(grip_error="9e-12"))
     assert compared(before, now, Tolerance(1e-6, 0.0)).within
     (found,) = compared(before, table(changed(grip_error="4e-7")), Tolerance(1e-6, 0.0)).exceedances
-    assert (found.column, found.allowed) == ("grip error [-]", pytest.approx(3e-7))
+    assert found.column == "grip error [-]"
+    assert found.allowed == pytest.approx(3e-7)
 
 
 @pytest.mark.parametrize(
@@ -123,10 +124,12 @@ def test_what_a_search_went_through_is_no_part_of_its_result() -> None:
     assert compared(table(ROW), table(changed(id="9"))).within
     headings = ["id", "round", "status", "reason", "f [mm]", "seconds [s]"]
     before = ["0", "1", "failed", "cannot be built", "200", "0.5"]
-    rows = [table(row, headings=headings, path=EVALUATIONS) for row in (before, [*before[:-1], "9.0"])]
-    assert compared(*rows).within
+    first, second = (
+        table(row, headings=headings, path=EVALUATIONS) for row in (before, [*before[:-1], "9.0"])
+    )
+    assert compared(first, second).within
     other = table([*before[:3], "out of reach", *before[4:]], headings=headings, path=EVALUATIONS)
-    (found,) = compared(rows[0], other).exceedances
+    (found,) = compared(first, other).exceedances
     assert (found.row, found.column) == ("id 0", "reason")
 
 

@@ -173,6 +173,22 @@ def test_a_changed_study_is_refused_until_it_is_made_the_baseline(baseline: Path
     assert tpm_design("compare", baseline, other).code == 0
 
 
+def test_a_proof_that_is_lost_deviates(baseline: Path, run: Path) -> None:
+    for folder, outcome in ((baseline, "proved"), (run, "undecided")):
+        path = folder / "run.json"
+        summary = json.loads(path.read_text(encoding="utf-8"))
+        requirements = {"coverage": {"outcome": "proved"}, "conditioning_min": {"outcome": outcome}}
+        path.write_text(
+            json.dumps(summary | {"certificate": {"requirements": requirements}}), encoding="utf-8"
+        )
+    data = tpm_design("compare", baseline, run, "--json")
+    (found,) = json.loads(data.output)["exceedances"]
+    assert data.code == 4
+    assert [found[name] for name in ("row", "column", "baseline", "run")] == [
+        *("run.json", "verdict on conditioning_min", "proved", "undecided")
+    ]
+
+
 def renamed(baseline: Path, run: Path) -> None:
     path = run / "study.yaml"
     path.write_text(path.read_text(encoding="utf-8").replace("name: small", "name: other"), encoding="utf-8")
@@ -324,8 +340,10 @@ def test_a_design_is_judged_by_the_samples_of_its_round(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
+        (without_summary, "This run did not come to its end."),
+        (interrupted, "This run did not come to its end."),
         (without_designs, "There is no designs.csv here."),
-        (emptied, "There is no designs.csv here."),
+        (emptied, "There is no result here."),
         (swept, "This is a sweep"),
         (cut_short, "designs.csv:2: "),
     ],

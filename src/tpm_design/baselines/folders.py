@@ -61,7 +61,7 @@ def read_result(folder: Path) -> Result:
         raise UsageError(
             "This run did not come to its end.",
             where=str(folder / SUMMARY),
-            remedy="Compare runs that did; this file says how each ended.",
+            remedy="Name one that did; this file says how each ended.",
         )
     result = Result(folder, read_document(folder / STUDY).data, summary)
     if not (folder / result.file).is_file():

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from tpm_design.baselines.deviations import Deviations, compare_tables
+from tpm_design.baselines.folders import read_result
 from tpm_design.baselines.tables import ResultTable, Row, metric_of_error, parse_table, read_table
 from tpm_design.errors import UsageError
 from tpm_design.problem import Design, Problem, Sample, evaluate
-from tpm_design.runs.folder import DESIGNS, LOG, STUDY, SUMMARY, read_run, read_summary
+from tpm_design.runs.folder import DESIGNS, LOG, STUDY, SUMMARY, read_run
 from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import designs_table, metric_columns, parameter_columns
 from tpm_design.study import Study, load_study
@@ -69,24 +70,19 @@ def reproduce(folder: Path, *, allow_code: bool) -> Deviations:
     Designs are taken from the log, with exact numbers, where the folder has one, else from designs.csv.
     Raises UsageError, StudyError or PlugInError.
     """
-    if "sweep" in read_summary(folder):
+    result = read_result(folder)
+    if result.is_sweep:
         raise UsageError(
             "This is a sweep, not a search with a result to reproduce.",
             where=str(folder),
             remedy="Sweep again and use `compare`.",
-        )
-    if not (folder / DESIGNS).is_file():
-        raise UsageError(
-            f"There is no {DESIGNS} here.",
-            where=str(folder),
-            remedy="Name the folder of a search that ended, or a baseline.",
         )
     stored = read_table(folder / DESIGNS)
     if not stored.rows:
         raise UsageError("It holds no design.", where=str(folder / DESIGNS), remedy="Run the study again.")
     study = load_study(folder / STUDY, allow_code=allow_code)
     designs = _exact_designs(folder, stored) if (folder / LOG).is_file() else _written_designs(study, stored)
-    rounds = read_summary(folder).get("rounds", [])
+    rounds = result.summary.get("rounds", [])
     again = [
         Entry(number, evaluate(_judged(study.problem, rounds, number), design)) for number, design in designs
     ]

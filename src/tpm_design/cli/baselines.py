@@ -24,6 +24,7 @@ from tpm_design.baselines.folders import (
 from tpm_design.baselines.junit import junit_xml
 from tpm_design.baselines.reproduction import SAME_TO, reproduce
 from tpm_design.baselines.tables import read_table
+from tpm_design.baselines.verdicts import with_verdicts
 from tpm_design.baselines.words import (
     HEADINGS,
     comparison_markdown,
@@ -76,6 +77,7 @@ def compare_runs(
             "There is nothing to compare: both tables are empty.", where=str(run_folder / run.file)
         )
     found = compare_tables(before, now, tolerance.allowed)
+    found = with_verdicts(found, baseline.summary, run.summary)
     remarks = remarks_on(baseline, run)
     if junit is not None:
         _write(junit, junit_xml(found, run.name, remarks, datetime.now(UTC)))
