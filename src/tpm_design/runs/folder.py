@@ -151,10 +151,11 @@ def read_run(folder: Path) -> StoredRun:
                 where=f"{folder / LOG}:{number}",
                 remedy="Restore the run from a copy, or run the study again.",
             ) from None
-    return StoredRun(folder, tuple(sorted(entries, key=lambda e: e.number)), _read_summary(folder))
+    return StoredRun(folder, tuple(sorted(entries, key=lambda e: e.number)), read_summary(folder))
 
 
-def _read_summary(folder: Path) -> Mapping[str, Any]:
+def read_summary(folder: Path) -> Mapping[str, Any]:
+    """The contents of run.json, empty where there is none. Raises UsageError where it is damaged."""
     path = folder / SUMMARY
     if not path.is_file():
         return {}
