@@ -36,6 +36,7 @@ ROOMS = (
     "runs",
     "study",
     "report",
+    "baselines",
     "cli",
     "__main__",
 )

@@ -14,8 +14,9 @@ from tpm_design.certificates.demands import NoProofError, demands
 from tpm_design.certificates.document import document
 from tpm_design.certificates.machines import perturbed
 from tpm_design.certificates.tolerances import largest_tolerance
-from tpm_design.certificates.verdict import Requirement, Verdict, verdict
-from tpm_design.mechanisms import mechanism_kind
+from tpm_design.certificates.verdict import Requirement, Verdict, check_tolerances, verdict
+from tpm_design.errors import ParameterError
+from tpm_design.mechanisms import mechanism, mechanism_kind
 from tpm_design.metrics import METRICS
 from tpm_design.problem import Goal
 from tpm_design.study import Study
@@ -210,3 +211,11 @@ def test_every_metric_has_demands_or_says_that_it_has_none(name: str) -> None:
     both = Goal(metric, name, options, minimum=0.1, maximum=0.9)
     with pytest.raises(NoProofError):
         demands(both, kind, [1.0] * len(kind.determinants))
+
+
+@pytest.mark.parametrize(("name", "bound"), [("f", 0.5), ("r", 0.2), ("k", 1.0), ("db", 0.2)])
+def test_a_tolerance_that_is_as_large_as_its_parameter_is_refused(name: str, bound: float) -> None:
+    machine = mechanism("uru", db=0.1, dp=0.06, f=0.2, r=0.2, k=1.0)
+    with pytest.raises(ParameterError, match=f"tolerance of {name}"):
+        check_tolerances(machine, {name: bound})
+    check_tolerances(machine, {name: 0.05})

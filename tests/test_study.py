@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,8 +18,10 @@ from tpm_design.study import (
     GridSweep,
     ListSweep,
     SampleSweep,
+    Study,
     choose_design,
     dump_yaml,
+    load_comparison,
     load_study,
     study_schema,
     template,
@@ -58,13 +61,73 @@ def loaded(folder: Path, *pairs: tuple[str, str]):  # type: ignore[no-untyped-de
 # ------------------------------------------------------------------------------------- good studies
 
 
+def studies_in(path: Path) -> list[Study]:
+    """The study of a file, or all that it compares."""
+    comparison = load_comparison(path)
+    return [load_study(path)] if comparison is None else list(comparison.studies.values())
+
+
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.name)
 def test_studies_of_the_project_are_valid_and_resolve_to_themselves(path: Path, tmp_path: Path) -> None:
-    study = load_study(path)
-    again = load_study(written(tmp_path, dump_yaml(study.resolved())))
-    assert again == study
-    assert again.resolved() == study.resolved()
-    assert again.study_hash == study.study_hash
+    for study in studies_in(path):
+        again = load_study(written(tmp_path, dump_yaml(study.resolved())))
+        assert again == study
+        assert again.resolved() == study.resolved()
+        assert again.study_hash == study.study_hash
+
+
+COMPARISON = """\
+version: 1
+name: both
+units: {length: mm, angle: deg}
+architectures:
+  glide: {mechanism: {type: orthoglide, parameters: {L: {min: 100, max: 400}}, mode: {carriages: "+++"}}}
+  towers:
+    mechanism:
+      type: linear_delta
+      parameters: {R: 150, r: 40, l: {min: 200, max: 300}, rail: 500}
+      mode: {carriages: "+++"}
+    region: {type: sphere, radius: 30, center: [0, 0, -400]}
+region: {type: sphere, radius: 30, center: [0, 0, 0]}
+objectives: [{metric: total_link_length, sense: minimize}]
+constraints: [{metric: coverage, min: 1}]
+optimizer: {method: scipy.differential_evolution, budget: 40, seed: 1}
+"""
+
+
+def test_a_comparison_is_a_study_for_each_architecture(tmp_path: Path) -> None:
+    comparison = load_comparison(written(tmp_path, COMPARISON))
+    assert comparison is not None
+    assert {label: study.name for label, study in comparison.studies.items()} == {
+        "glide": "both-glide",
+        "towers": "both-towers",
+    }
+    assert comparison.studies["glide"].problem.kind.name == "orthoglide"
+    assert comparison.studies["glide"].problem.fixed["center_z"] == 0.0
+    assert comparison.studies["towers"].problem.fixed["center_z"] == -0.4
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (
+            "  glide: {mechanism:",
+            "  glide: {units: {length: m}, mechanism:",
+            r":5: units is said once for all",
+        ),
+        ("  glide: {mechanism:", "  glide: {mechanisms:", r":5: 'mechanisms' is no part of a study"),
+        ("type: orthoglide", "type: orthoglid", r":5: there is no mechanism 'orthoglid'"),
+        ("    region: {type: sphere, radius: 30", "    region: {type: sphere, radius: -30", r":11: .*radius"),
+        ("{metric: coverage, min: 1}", "{metric: covrage, min: 1}", r":14: there is no metric 'covrage'"),
+    ],
+)
+def test_what_is_wrong_in_a_comparison_is_told_with_its_line(
+    old: str, new: str, told: str, tmp_path: Path
+) -> None:
+    assert old in COMPARISON
+    with pytest.raises(StudyError) as caught:
+        load_comparison(written(tmp_path, COMPARISON.replace(old, new)))
+    assert re.search(told, str(caught.value)), str(caught.value)
 
 
 def test_everything_inside_is_si(tmp_path: Path) -> None:
@@ -969,8 +1032,8 @@ def test_the_schema_knows_the_names_and_the_studies(tmp_path: Path) -> None:
     jsonschema.Draft202012Validator.check_schema(schema)
     validator = jsonschema.Draft202012Validator(schema)
     for path in STUDIES:
-        resolved = load_study(path).resolved()
-        assert list(validator.iter_errors(resolved)) == []
+        for study in studies_in(path):
+            assert list(validator.iter_errors(study.resolved())) == []
         assert list(validator.iter_errors(read_document(path).data)) == []
     good = load_study(STUDIES[0]).resolved()
     for section, key, wrong in [

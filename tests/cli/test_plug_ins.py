@@ -211,7 +211,7 @@ def test_its_constraints_are_settled_and_no_checker_pretends_to_know_it(
     tmp_path: Path, h: str, code: int, word: str
 ) -> None:
     study, proof = written(tmp_path) / "study.yaml", tmp_path / "proof.json"
-    settled = tpm_design("certify", study, "--set", f"h={h}", "--allow-code", "--output", proof)
+    settled = tpm_design("certify", study, "--set", f"h={h}", "--allow-code", "--quiet", "--output", proof)
     assert (settled.code, settled.errors) == (code, "")
     assert word in settled.output
     assert "--check" not in settled.output

@@ -191,7 +191,8 @@ def test_impossible_parameters_are_refused_in_words(kind: MechanismKind) -> None
 
 def test_unreachable_poses_have_no_coordinates(machine: Mechanism) -> None:
     mode = first_mode(machine)
-    far = 10.0 * machine.reach_radius() * np.vstack([np.eye(3), -np.eye(3), np.ones((1, 3))])
+    steps = np.vstack([np.eye(3), -np.eye(3), np.ones((1, 3))])
+    far = machine.poses(10.0 * steps * np.asarray(machine.reach_half_axes()))
     assert np.isnan(machine.ik(far, mode)).all()
     assert np.isnan(machine.jacobian(far, mode)).all()
     assert (machine.margins(far, mode)["reach"] < 0.0).all()

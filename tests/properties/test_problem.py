@@ -98,6 +98,8 @@ def everything() -> tuple[Goal, ...]:
     """Every metric bounded by what it is at best, so that slacks of both signs occur."""
     goals = []
     for metric in METRICS.values():
+        if metric.refusal(KIND, {}) is not None:
+            continue
         options = {"threshold": 0.3} if metric.name == "conditioning_share" else {}
         bound = {"minimum": 0.1} if metric.better == "maximize" else {"maximum": 1.0}
         goals.append(goal(metric.name, options=options, **bound))

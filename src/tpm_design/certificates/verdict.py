@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from tpm_design.arithmetic.rounding import check_rounding
 from tpm_design.certificates.demands import REACH, Demand, NoProofError, demands, refutable
 from tpm_design.certificates.settlement import Breaking, Outcome, Settlement, settle
+from tpm_design.errors import ParameterError
+from tpm_design.mechanisms.mechanism import Mechanism
+from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Design, Goal, Problem, design_context
 
@@ -65,11 +68,12 @@ def verdict(
     """Settle every constraint of the problem for all machines within ``tolerance`` (name → ±, SI, each limb
     by itself), with at most ``boxes`` boxes for each proof. The result is the same for any number of workers.
 
-    Raises ParameterError where the design cannot be built.
+    Raises ParameterError where the design cannot be built, or a tolerance is not smaller than what it is on.
     """
     began = time.perf_counter()
     check_rounding()
     context = design_context(problem, design)
+    check_tolerances(context.mechanism, tolerance)
     needs = [_needs(goal, context) for goal in problem.constraints]
     # each statement once, however many requirements need it
     distinct = list(dict.fromkeys(demand for need in needs if not isinstance(need, str) for demand in need))
@@ -96,6 +100,27 @@ def verdict(
     return Verdict(
         context, design, tolerance, settlements, requirements, outcome, time.perf_counter() - began
     )
+
+
+def check_tolerances(mechanism: Mechanism, tolerance: Mapping[str, float]) -> None:
+    """Raises ParameterError where a machine within ``tolerance`` (SI) would have a dimension that none can
+    have."""
+    for name, bounds in limb_tolerances(mechanism.kind, tolerance).items():
+        parameter = mechanism.kind.parameter(name)
+        for value, bound in zip(mechanism.parameters[name], bounds, strict=True):
+            outside = {
+                "positive": bound >= abs(value),
+                "non-zero": bound >= abs(value),
+                "non-negative": bound > abs(value),
+                "any": False,
+            }[parameter.domain if parameter else "any"]
+            if bound > 0.0 and outside:
+                raise ParameterError(
+                    f"The tolerance of {name}, {bound:g} m, is not smaller than {name} itself, {value:g} m."
+                    if parameter and parameter.dimension == "length"
+                    else f"The tolerance of {name}, {bound:g}, is not smaller than {name} itself, {value:g}.",
+                    remedy="Tolerances are ± and in the study's units, as its parameters are.",
+                )
 
 
 def worst_outcome(outcomes: list[Outcome]) -> Outcome:
@@ -146,5 +171,18 @@ def _slack(needed: list[Settlement]) -> float:
     return min(carrying, default=needed[-1].slack)
 
 
+WORDS = {
+    "determinant": "singularity",
+    "serial": "limb stretched or folded",
+    "frobenius": "1/κ_F",
+    "condition": "1/κ₂",
+    "slowest": "least velocity factor",
+    "fastest": "greatest velocity factor",
+    "locus": "distance to the singularity",
+    "length": "length of the links",
+}
+
+
 def _named(demand: Demand) -> str:
-    return f"{demand.name} {demand.kind}" if demand.name else demand.kind
+    words = WORDS.get(demand.kind, demand.kind)
+    return f"{demand.name} {words}" if demand.name else words

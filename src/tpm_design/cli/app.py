@@ -46,8 +46,9 @@ def options(
 ) -> None:
     """Dimensions for translational parallel robots: reachable, well conditioned, far from singularities.
 
-    Exit codes: 0 done, 1 internal error, 2 wrong usage or invalid study, 3 no feasible design, 5 requirement
-    refuted or not proved, 130 interrupted: --resume goes on.
+    Exit codes: 0 done, 1 internal error, 2 wrong usage or invalid study, 3 no feasible design, 4 outside
+    tolerance of a baseline or of stored results, 5 requirement refuted or not proved, 130 interrupted:
+    --resume goes on.
     """
 
 
@@ -233,6 +234,57 @@ def report(
     from tpm_design.cli.commands import report_runs
 
     return report_runs(runs or [], allow_code=allow_code, quiet=quiet)
+
+
+@app.command()
+@guarded
+def compare(
+    baseline: Annotated[
+        Path, typer.Argument(metavar="BASELINE", help="Folder of a run or a baseline.", show_default=False)
+    ],
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.", show_default=False)],
+    rtol: Annotated[float, typer.Option(help="Allowed share of the baseline's value.")] = 1e-6,
+    atol: Annotated[float, typer.Option(help="Allowed besides, in each column's own unit.")] = 0.0,
+    junit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write JUnit XML, a test case for each column.")
+    ] = None,
+    markdown: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a summary for a pull request.")
+    ] = None,
+    update_baseline: Annotated[
+        bool, typer.Option("--update-baseline", help="Show what deviates, then make RUN the baseline.")
+    ] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int | None:
+    """Compare a run with an earlier one: everything outside tolerance; exit code 4 where there is any."""
+    from tpm_design.baselines.deviations import Tolerance
+    from tpm_design.cli.baselines import compare_runs
+
+    return compare_runs(
+        baseline,
+        run,
+        Tolerance(rtol, atol),
+        junit,
+        markdown,
+        update=update_baseline,
+        as_json=as_json,
+        quiet=quiet,
+    )
+
+
+@app.command()
+@guarded
+def reproduce(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder or baseline.", show_default=False)],
+    allow_code: AllowCode = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int | None:
+    """Evaluate the designs a run ended with again; exit code 4 where they do not come back."""
+    from tpm_design.cli.baselines import reproduce_run
+
+    return reproduce_run(run, allow_code=allow_code, as_json=as_json, quiet=quiet)
 
 
 def main() -> None:

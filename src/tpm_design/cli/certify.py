@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from tpm_design.cli.progress import SECONDS_BETWEEN_LINES
 from tpm_design.cli.results import design_rows
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
-from tpm_design.problem import Design, Evaluation
+from tpm_design.problem import Design
 from tpm_design.report.words import asked, pose_text, pose_unit_names
 from tpm_design.runs.tables import goal_unit
 from tpm_design.study import Study
@@ -70,6 +71,8 @@ def certify_one(
     if max_tolerance:
         return _largest(study, design, threads, as_json=as_json, quiet=quiet)
     asked_for = study.certification or NOTHING_ASKED
+    if not (quiet or as_json):
+        print("Proving; the equations are compiled on first use, for up to a minute.", file=sys.stderr)
     found = verdict(study.problem, design, asked_for.tolerance, boxes=asked_for.boxes, workers=threads)
     target = output or (path / FILE if path.is_dir() and not settings else Path(FILE))
     write_document(target, document(study.problem, study.resolved(), study.study_hash, found))
@@ -77,7 +80,10 @@ def certify_one(
         print(json.dumps(verdict_data(study, found) | {"certificate": str(target)}, ensure_ascii=False))
     else:
         if not quiet:
-            print(table(["design", "value", "searched in"], _design_rows(study, design)) + "\n")
+            print(
+                table(["design", "value", "searched in"], design_rows(study.problem, study.units, design))
+                + "\n"
+            )
         print(verdict_text(study, found))
         print(f"Certificate: {target}\n{_next(study, target)}")
     return None if found.outcome == "proved" else NOT_PROVED
@@ -87,11 +93,6 @@ def _next(study: Study, target: Path) -> str:
     if study.plug_in is not None:
         return f"It rests on the formulas of {study.plug_in.name}: no second implementation can check it."
     return f"Next: tpm-design certify --check {target}"
-
-
-def _design_rows(study: Study, design: Design) -> list[list[str]]:
-    bare = Evaluation(design, {}, {}, {}, {}, {}, 0.0, "feasible", "", 0.0)
-    return design_rows(study.problem, study.units, bare)
 
 
 def verdict_text(study: Study, found: Verdict) -> str:
@@ -143,13 +144,27 @@ def _pose_text(study: Study, found: Verdict, coordinates: Sequence[float]) -> st
     return pose_text(study.problem.kind, _user_pose(found, coordinates), study.units)
 
 
+def _machine_text(study: Study, found: Verdict, parameters: Mapping[str, tuple[float, ...]]) -> str:
+    """The dimensions in which a machine differs from the design: `` with f1 = 250.1 mm, …``."""
+    parts = []
+    for name, values in parameters.items():
+        parameter = study.problem.kind.parameter(name)
+        unit = si_unit(parameter.dimension if parameter else "length")
+        nominal = found.context.mechanism.parameters[name]
+        for limb, (value, exact) in enumerate(zip(values, nominal, strict=True), start=1):
+            if value != exact:
+                parts.append(f"{name}{limb} = {study.units.written(value, unit)}")
+    return f" with {', '.join(parts)}" if parts else ""
+
+
 def _requirement_row(study: Study, found: Verdict, requirement: Requirement) -> list[str]:
     goal = requirement.goal
     unit = goal_unit(study.problem, goal)
     spare = "" if requirement.slack is None else study.units.written(requirement.slack, unit, digits=3)
     why = requirement.reason
     if requirement.breaking is not None and requirement.breaking.pose is not None:
-        why = f"broken at {_pose_text(study, found, requirement.breaking.pose)}: {why}"
+        machine = _machine_text(study, found, requirement.breaking.parameters)
+        why = f"broken at {_pose_text(study, found, requirement.breaking.pose)}{machine}: {why}"
     if requirement.open_box is not None:
         middle = [0.5 * (low + high) for low, high in requirement.open_box]
         why = f"not proved around {_pose_text(study, found, middle)}: {why}"

@@ -198,7 +198,7 @@ def _print_pose(
     if as_json:
         print(json.dumps(data, ensure_ascii=False))
         return None
-    print(table(["design", "value"], [row[:2] for row in design_rows(study.problem, units, _bare(design))]))
+    print(table(["design", "value"], [row[:2] for row in design_rows(study.problem, units, design)]))
     rows = []
     for drive, entry in data["actuators"].items():
         rows.append([f"{drive} coordinates [{entry['unit']}]", _row_text(entry["value"])])
@@ -211,12 +211,6 @@ def _print_pose(
     if values["actuators"][kind.drives[0]][0] is None:
         print("\nThis pose is not reachable in the working mode.")
     return None
-
-
-def _bare(design: Design) -> Any:
-    from tpm_design.problem import Evaluation
-
-    return Evaluation(design, {}, {}, {}, {}, {}, 0.0, "feasible", "", 0.0)
 
 
 def _row_text(values: Sequence[float | None]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from tpm_design.cli.text import table
-from tpm_design.problem import Evaluation, Goal, Problem
+from tpm_design.problem import Design, Evaluation, Goal, Problem
 from tpm_design.report.readings import at_end, limiting, nearest_constraint
 from tpm_design.report.words import asked, range_text
 from tpm_design.runs.search import Entry
@@ -17,11 +17,11 @@ from tpm_design.units import Units
 NO_VALUE = "–"
 
 
-def design_rows(problem: Problem, units: Units, evaluation: Evaluation) -> list[list[str]]:
+def design_rows(problem: Problem, units: Units, chosen: Design) -> list[list[str]]:
     """Quantity, value with unit, and the range it was searched in."""
     rows = []
     for column in parameter_columns(problem, units):
-        value = evaluation.design[column.name]
+        value = chosen[column.name]
         text = value if isinstance(value, str) else units.written(value, column.unit)
         rows.append([column.name, text, range_text(problem, column.name, units)])
     return rows
@@ -65,7 +65,7 @@ def _slack_text(problem: Problem, units: Units, evaluation: Evaluation, goal: Go
 
 def result_text(problem: Problem, units: Units, evaluation: Evaluation) -> str:
     """A design and all its metrics as two tables."""
-    design = table(["design", "value", "searched in"], design_rows(problem, units, evaluation))
+    design = table(["design", "value", "searched in"], design_rows(problem, units, evaluation.design))
     if evaluation.status == "failed":
         return f"{design}\n\nThis design cannot be evaluated: {evaluation.reason}"
     rows = metric_rows(problem, units, evaluation)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Assembly:
-    """One way in which the limbs close. ``pose`` (3,) in metres; ``box``: bounds (m) of its coordinates;
+    """One way in which the limbs close. ``pose`` (3,) in SI units; ``box``: bounds of its coordinates;
     ``unique``: the box is proved to hold this assembly and no other (else it may hold none or several)."""
 
     pose: tuple[float, float, float]

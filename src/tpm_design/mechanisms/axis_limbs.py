@@ -82,11 +82,6 @@ def limb_point(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
     raise NotImplementedError
 
 
-def limb_stroke(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
-    """S of one limb (m), see the implementation."""
-    raise NotImplementedError
-
-
 def limb_reach(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
     """Outer and inner margin of one limb (m), see the implementation."""
     raise NotImplementedError
@@ -99,11 +94,6 @@ def limb_sides(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
 
 def limb_bend(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
     """|sin| of the angle between the links of one limb, see the implementation."""
-    raise NotImplementedError
-
-
-def limb_joints(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def]
-    """Carriage, elbow and platform joint of one limb, see the implementation."""
     raise NotImplementedError
 
 
@@ -125,7 +115,8 @@ def _limb_point(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
     return alpha, beta, sqr(alpha) + sqr(beta)
 
 
-def _limb_stroke(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
+def _limb_actuator(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
+    """S_i (m), equation (2) of the source: either elbow is above the same carriage."""
     wx, wy, wz = limb_offset(geometry, limb, x, y, z)
     sx, sy, sz = geometry.directions.axis[limb]
     return (sx * wx + sy * wy + sz * wz) / geometry.directions.advance[limb]
@@ -151,7 +142,7 @@ def _limb_sides(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
     spare = 1.0 + 0.0 * x
     above, below, bent, straight = spare, spare, spare, spare
     if limits.stroke_limited != 0.0:
-        stroke = limb_stroke(geometry, limb, x, y, z)
+        stroke = equations.limb_actuator(geometry, limb, 1.0, x, y, z)
         above, below = stroke - limits.lowest, limits.highest - stroke
     _, _, square = limb_point(geometry, limb, x, y, z)
     f, r = geometry.first[limb], geometry.second[limb]
@@ -170,12 +161,12 @@ def _limb_bend(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
     return root(1.0 - sqr((square - (sqr(f) + sqr(r))) / (2.0 * (f * r))))
 
 
-def _limb_joints(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def]
+def _limb_joints(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
     """a + S d, p + b − r (a g + c h) and p + b, with (a, c) the direction of the second link."""
     alpha, beta, square = limb_point(geometry, limb, x, y, z)
     r = geometry.second[limb]
-    a, c, _ = distal_link(alpha, beta, square, geometry.first[limb], r, elbow)
-    stroke = limb_stroke(geometry, limb, x, y, z)
+    a, c, _ = distal_link(alpha, beta, square, geometry.first[limb], r, sign)
+    stroke = equations.limb_actuator(geometry, limb, sign, x, y, z)
     dx, dy, dz = geometry.directions.slide[limb]
     gx, gy, gz = geometry.directions.across[limb]
     hx, hy, hz = geometry.directions.beyond[limb]
@@ -239,25 +230,6 @@ def _input_transmission(geometry, mode, x, y, z):  # type: ignore[no-untyped-def
     return magnitude(a), magnitude(b), magnitude(c)
 
 
-def _actuators(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
-    """S_i (m), equation (2) of the source."""
-    return (
-        limb_stroke(geometry, 0, x, y, z),
-        limb_stroke(geometry, 1, x, y, z),
-        limb_stroke(geometry, 2, x, y, z),
-    )
-
-
-def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """Carriage, elbow and platform joint of each limb."""
-    k1, k2, k3 = mode.elbows
-    return (
-        limb_joints(geometry, 0, k1, x, y, z),
-        limb_joints(geometry, 1, k2, x, y, z),
-        limb_joints(geometry, 2, k3, x, y, z),
-    )
-
-
 def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """Carriages locked: s_i · dx = s_i · (da_i − db_i), for errors of base and platform points by
     themselves; the links' lengths do not matter."""
@@ -281,19 +253,17 @@ def axis_limb_equations(geometry_class: type) -> None:
     ``AxisLimbGeometry`` has. It gives ``with_limb_parameters`` itself."""
     formula(limb_offset, geometry_class)(_limb_offset)
     formula(limb_point, geometry_class)(_limb_point)
-    formula(limb_stroke, geometry_class)(_limb_stroke)
+    formula(equations.limb_actuator, geometry_class)(_limb_actuator)
     formula(limb_reach, geometry_class)(_limb_reach)
     formula(limb_sides, geometry_class)(_limb_sides)
     formula(limb_bend, geometry_class)(_limb_bend)
-    formula(limb_joints, geometry_class)(_limb_joints)
+    formula(equations.limb_joints, geometry_class)(_limb_joints)
     formula(axis_row, geometry_class)(_axis_row)
     formula(equations.leg_margins, geometry_class)(_leg_margins)
     formula(equations.mode_margins, geometry_class)(_mode_margins)
     formula(equations.unit_velocity_map, geometry_class)(_unit_velocity_map)
     formula(equations.serial_margins, geometry_class)(_serial_margins)
     formula(equations.input_transmission, geometry_class)(_input_transmission)
-    formula(equations.actuators, geometry_class)(_actuators)
-    formula(equations.joint_centres, geometry_class)(_joint_centres)
     formula(equations.length_error_gains, geometry_class)(_length_error_gains)
     formula(equations.limb_parameters, geometry_class)(_limb_parameters)
 

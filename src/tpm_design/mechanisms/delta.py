@@ -91,14 +91,10 @@ def _limb_chain(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def]
     return (a * share, c * share, aside / distal), (alpha - seen * a, beta - seen * c), gamma * share
 
 
-def limb_row(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def]
-    """Unit row s_i in x, y, z and b_i of one limb, see the implementation."""
-    raise NotImplementedError
-
-
-@formula(limb_row, DeltaGeometry)
-def _limb_row(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def]
-    (out, down, aside), _, b = limb_chain(geometry, limb, elbow, x, y, z)
+@formula(equations.limb_row, DeltaGeometry)
+def _limb_row(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
+    """s_i · ẋ = L (s_i · t_i) θ̇_i: the lower arm keeps its length."""
+    (out, down, aside), _, b = limb_chain(geometry, limb, sign, x, y, z)
     ex, ey, _ = geometry.outward[limb]
     tx, ty, _ = geometry.hinge[limb]
     return (out * ex + aside * tx, out * ey + aside * ty, -down), b
@@ -154,16 +150,6 @@ def _mode_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     return turn1, swing1, turn2, swing2, turn3, swing3
 
 
-@formula(equations.unit_velocity_map, DeltaGeometry)
-def _unit_velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
-    """s_i · ẋ = L (s_i · t_i) θ̇_i: the lower arm keeps its length."""
-    k1, k2, k3 = mode.elbows
-    row1, b1 = limb_row(geometry, 0, k1, x, y, z)
-    row2, b2 = limb_row(geometry, 1, k2, x, y, z)
-    row3, b3 = limb_row(geometry, 2, k3, x, y, z)
-    return (row1, row2, row3), (b1, b2, b3), (1.0, 1.0, 1.0)
-
-
 @formula(equations.singularity_margins, DeltaGeometry)
 def _singularity_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """det of the unit lower arms, det of the unit normals of the parallelograms."""
@@ -182,36 +168,17 @@ def _serial_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     return magnitude(b1 / l1), magnitude(b2 / l2), magnitude(b3 / l3)
 
 
-def limb_angle(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def]
-    """θ_i of one limb (rad), see the implementation."""
-    raise NotImplementedError
-
-
-@formula(limb_angle, DeltaGeometry)
-def _limb_angle(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def]
-    _, (out, down), _ = limb_chain(geometry, limb, elbow, x, y, z)
+@formula(equations.limb_actuator, DeltaGeometry)
+def _limb_actuator(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
+    """θ_i (rad), positive downward from the horizontal, in (−π, π]."""
+    _, (out, down), _ = limb_chain(geometry, limb, sign, x, y, z)
     return math.atan2(down, out)
 
 
-@formula(equations.actuators, DeltaGeometry)
-def _actuators(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
-    """θ_i, positive downward from the horizontal, in (−π, π]."""
-    k1, k2, k3 = mode.elbows
-    return (
-        limb_angle(geometry, 0, k1, x, y, z),
-        limb_angle(geometry, 1, k2, x, y, z),
-        limb_angle(geometry, 2, k3, x, y, z),
-    )
-
-
-def limb_joints(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def]
-    """Motor, knee and platform joint of one limb, see the implementation."""
-    raise NotImplementedError
-
-
-@formula(limb_joints, DeltaGeometry)
-def _limb_joints(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def]
-    _, (out, down), _ = limb_chain(geometry, limb, elbow, x, y, z)
+@formula(equations.limb_joints, DeltaGeometry)
+def _limb_joints(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
+    """w_i ε_i, the knee, p + u_i ε_i."""
+    _, (out, down), _ = limb_chain(geometry, limb, sign, x, y, z)
     ex, ey, _ = geometry.outward[limb]
     base, platform = geometry.base[limb], geometry.platform[limb]
     knee = base + out
@@ -222,39 +189,12 @@ def _limb_joints(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def
     )
 
 
-@formula(equations.joint_centres, DeltaGeometry)
-def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """w_i ε_i, the knee, p + u_i ε_i of each limb."""
-    k1, k2, k3 = mode.elbows
-    return (
-        limb_joints(geometry, 0, k1, x, y, z),
-        limb_joints(geometry, 1, k2, x, y, z),
-        limb_joints(geometry, 2, k3, x, y, z),
-    )
-
-
-def limb_error_gain(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def]
-    """Norm of one limb's length-error coefficients, see the implementation."""
-    raise NotImplementedError
-
-
-@formula(limb_error_gain, DeltaGeometry)
-def _limb_error_gain(geometry, limb, elbow, x, y, z):  # type: ignore[no-untyped-def]
+@formula(equations.limb_error_gain, DeltaGeometry)
+def _limb_error_gain(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
     """Motors locked: s_i · dx = (s_i · ε_i)(dw − du) + (s_i · knee_i/L) dL + dl."""
-    (along, down, _), (out, below), _ = limb_chain(geometry, limb, elbow, x, y, z)
+    (along, down, _), (out, below), _ = limb_chain(geometry, limb, sign, x, y, z)
     bend = (along * out + down * below) / geometry.proximal[limb]
     return root(2.0 * sqr(along) + sqr(bend) + 1.0)
-
-
-@formula(equations.length_error_gains, DeltaGeometry)
-def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """For errors of w, u, L, l of each limb by itself."""
-    k1, k2, k3 = mode.elbows
-    return (
-        limb_error_gain(geometry, 0, k1, x, y, z),
-        limb_error_gain(geometry, 1, k2, x, y, z),
-        limb_error_gain(geometry, 2, k3, x, y, z),
-    )
 
 
 @formula(equations.limb_parameters, DeltaGeometry)

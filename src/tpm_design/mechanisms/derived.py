@@ -2,12 +2,49 @@
 
 from __future__ import annotations
 
-import math
-
 from tpm_design.arithmetic import derived
 from tpm_design.arithmetic.algebra import determinant
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.segments import chain_distance
+
+
+@derived(equations.unit_velocity_map)
+def _unit_velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
+    k1, k2, k3 = mode[0]
+    row1, b1 = equations.limb_row(geometry, 0, k1, x, y, z)
+    row2, b2 = equations.limb_row(geometry, 1, k2, x, y, z)
+    row3, b3 = equations.limb_row(geometry, 2, k3, x, y, z)
+    return (row1, row2, row3), (b1, b2, b3), (1.0, 1.0, 1.0)
+
+
+@derived(equations.actuators)
+def _actuators(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
+    k1, k2, k3 = mode[0]
+    return (
+        equations.limb_actuator(geometry, 0, k1, x, y, z),
+        equations.limb_actuator(geometry, 1, k2, x, y, z),
+        equations.limb_actuator(geometry, 2, k3, x, y, z),
+    )
+
+
+@derived(equations.joint_centres)
+def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    k1, k2, k3 = mode[0]
+    return (
+        equations.limb_joints(geometry, 0, k1, x, y, z),
+        equations.limb_joints(geometry, 1, k2, x, y, z),
+        equations.limb_joints(geometry, 2, k3, x, y, z),
+    )
+
+
+@derived(equations.length_error_gains)
+def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    k1, k2, k3 = mode[0]
+    return (
+        equations.limb_error_gain(geometry, 0, k1, x, y, z),
+        equations.limb_error_gain(geometry, 1, k2, x, y, z),
+        equations.limb_error_gain(geometry, 2, k3, x, y, z),
+    )
 
 
 @derived(equations.velocity_map)
@@ -36,9 +73,3 @@ def _limb_clearance(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     first, second, third = equations.joint_centres(geometry, mode, x, y, z)
     least = min(chain_distance(first, second), chain_distance(second, third), chain_distance(third, first))
     return least - 2.0 * geometry.link_radius
-
-
-@derived(equations.length_error_gains)
-def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """There are none where poses are not positions: metrics of them are refused."""
-    return math.nan, math.nan, math.nan

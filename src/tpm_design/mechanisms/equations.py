@@ -85,3 +85,24 @@ def with_limb_parameters(geometry: Any, limb: Any, values: Any) -> Any:
     """The geometry with other parameters of one limb, in the same order. Where ``values`` are of another kind
     of number (Duals, say), the other limbs' parameters become constants of that kind."""
     raise NotImplementedError
+
+
+def limb_row(geometry: Any, limb: Any, sign: Any, x: Any, y: Any, z: Any) -> Any:
+    """The unit row of A and the entry of b of one limb. For mechanisms whose modes are one ``sign`` for each
+    limb: ``derived.py`` makes ``unit_velocity_map`` of it."""
+    raise NotImplementedError
+
+
+def limb_actuator(geometry: Any, limb: Any, sign: Any, x: Any, y: Any, z: Any) -> Any:
+    """The actuator coordinate of one limb, from which ``derived.py`` makes ``actuators``."""
+    raise NotImplementedError
+
+
+def limb_joints(geometry: Any, limb: Any, sign: Any, x: Any, y: Any, z: Any) -> Any:
+    """The chain of joint centres of one limb, from which ``derived.py`` makes ``joint_centres``."""
+    raise NotImplementedError
+
+
+def limb_error_gain(geometry: Any, limb: Any, sign: Any, x: Any, y: Any, z: Any) -> Any:
+    """The norm of one limb's length-error coefficients: ``derived.py`` makes ``length_error_gains`` of it."""
+    raise NotImplementedError

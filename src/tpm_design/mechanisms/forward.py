@@ -291,7 +291,7 @@ def confirmed(
     apart = _distinct(kept, APART * radius)
     if len(apart) < len(kept):
         crowded = next(assembly for assembly in kept if assembly not in apart)
-        raise _not_apart(q, f"Several may lie in the box {_box_text(crowded)}")
+        raise _not_apart(q, f"Several may lie in the box {_box_text(mechanism, crowded)}")
     return tuple(sorted(kept, key=lambda assembly: assembly.pose))
 
 
@@ -305,8 +305,11 @@ def _distinct(found: Iterable[Assembly], apart: float) -> list[Assembly]:
     return kept
 
 
-def _box_text(assembly: Assembly) -> str:
-    return " × ".join(f"[{low:.9g}, {high:.9g}]" for low, high in assembly.box) + " m"
+def _box_text(mechanism: Mechanism, assembly: Assembly) -> str:
+    box = " × ".join(f"[{low:.9g}, {high:.9g}]" for low, high in assembly.box)
+    return (
+        f"{box} m" if mechanism.kind.translational else f"{box} of ({', '.join(mechanism.kind.coordinates)})"
+    )
 
 
 def _not_apart(q: Sequence[float] | FloatArray, where: str) -> ParameterError:

@@ -30,8 +30,6 @@ from tpm_design.mechanisms.rails import (
     Triple,
     along_rail,
     anchor,
-    limb_carriage,
-    limb_row,
     rail_assemblies,
     rail_equations,
     swing_margin,
@@ -93,14 +91,10 @@ def _singularity_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-de
     )
 
 
-def limb_joints(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
-    """Top of the rail, carriage and platform joint of one limb, see the implementation."""
-    raise NotImplementedError
-
-
-@formula(limb_joints, LinearDeltaGeometry)
-def _limb_joints(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
-    q = limb_carriage(geometry, limb, side, x, y, z)
+@formula(equations.limb_joints, LinearDeltaGeometry)
+def _limb_joints(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
+    """R_i ε_i, R_i ε_i + q_i u_i and p + r_i ε_i."""
+    q = equations.limb_actuator(geometry, limb, sign, x, y, z)
     base, platform = geometry.base[limb], geometry.platform[limb]
     ex, ey, ez = geometry.outward[limb]
     ux, uy, uz = geometry.rail[limb]
@@ -111,39 +105,12 @@ def _limb_joints(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-@formula(equations.joint_centres, LinearDeltaGeometry)
-def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """R_i ε_i, R_i ε_i + q_i u_i and p + r_i ε_i of each limb."""
-    k1, k2, k3 = mode.carriages
-    return (
-        limb_joints(geometry, 0, k1, x, y, z),
-        limb_joints(geometry, 1, k2, x, y, z),
-        limb_joints(geometry, 2, k3, x, y, z),
-    )
-
-
-def limb_error_gain(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
-    """Norm of one limb's length-error coefficients, see the implementation."""
-    raise NotImplementedError
-
-
-@formula(limb_error_gain, LinearDeltaGeometry)
-def _limb_error_gain(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+@formula(equations.limb_error_gain, LinearDeltaGeometry)
+def _limb_error_gain(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
     """Carriages locked: s_i · dx = (s_i · ε_i)(dR − dr) + dl."""
-    (sx, sy, sz), _ = limb_row(geometry, limb, side, x, y, z)
+    (sx, sy, sz), _ = equations.limb_row(geometry, limb, sign, x, y, z)
     ex, ey, ez = geometry.outward[limb]
     return root(2.0 * sqr(sx * ex + sy * ey + sz * ez) + 1.0)
-
-
-@formula(equations.length_error_gains, LinearDeltaGeometry)
-def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """For errors of R, r, l of each limb by itself."""
-    k1, k2, k3 = mode.carriages
-    return (
-        limb_error_gain(geometry, 0, k1, x, y, z),
-        limb_error_gain(geometry, 1, k2, x, y, z),
-        limb_error_gain(geometry, 2, k3, x, y, z),
-    )
 
 
 @formula(equations.limb_parameters, LinearDeltaGeometry)

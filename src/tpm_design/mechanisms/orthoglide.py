@@ -30,8 +30,6 @@ from tpm_design.mechanisms.rails import (
     Triple,
     along_rail,
     anchor,
-    limb_carriage,
-    limb_row,
     rail_assemblies,
     rail_equations,
     swing_margin,
@@ -79,50 +77,19 @@ def _swing_margin(geometry, limb, w, h):  # type: ignore[no-untyped-def]
     return h - geometry.strut[limb] * geometry.swing_cosine
 
 
-def limb_joints(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
-    """Carriage and platform joint of one limb, see the implementation."""
-    raise NotImplementedError
-
-
-@formula(limb_joints, OrthoglideGeometry)
-def _limb_joints(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
-    q, d = limb_carriage(geometry, limb, side, x, y, z), geometry.platform[limb]
+@formula(equations.limb_joints, OrthoglideGeometry)
+def _limb_joints(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
+    """q_i e_i and p + d_i e_i."""
+    q, d = equations.limb_actuator(geometry, limb, sign, x, y, z), geometry.platform[limb]
     ex, ey, ez = geometry.rail[limb]
     return (q * ex, q * ey, q * ez), (x + d * ex, y + d * ey, z + d * ez)
 
 
-@formula(equations.joint_centres, OrthoglideGeometry)
-def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """q_i e_i and p + d_i e_i of each limb."""
-    k1, k2, k3 = mode.carriages
-    return (
-        limb_joints(geometry, 0, k1, x, y, z),
-        limb_joints(geometry, 1, k2, x, y, z),
-        limb_joints(geometry, 2, k3, x, y, z),
-    )
-
-
-def limb_error_gain(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
-    """Norm of one limb's length-error coefficients, see the implementation."""
-    raise NotImplementedError
-
-
-@formula(limb_error_gain, OrthoglideGeometry)
-def _limb_error_gain(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+@formula(equations.limb_error_gain, OrthoglideGeometry)
+def _limb_error_gain(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
     """Carriages locked: s_i · dx = −(s_i · e_i) dd + dL."""
-    _, b = limb_row(geometry, limb, side, x, y, z)
+    _, b = equations.limb_row(geometry, limb, sign, x, y, z)
     return root(sqr(b) + 1.0)
-
-
-@formula(equations.length_error_gains, OrthoglideGeometry)
-def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """For errors of d, L of each limb by itself."""
-    k1, k2, k3 = mode.carriages
-    return (
-        limb_error_gain(geometry, 0, k1, x, y, z),
-        limb_error_gain(geometry, 1, k2, x, y, z),
-        limb_error_gain(geometry, 2, k3, x, y, z),
-    )
 
 
 @formula(equations.limb_parameters, OrthoglideGeometry)

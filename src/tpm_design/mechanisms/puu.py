@@ -315,6 +315,12 @@ def _joint_centres(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
+@formula(equations.length_error_gains, PuuGeometry)
+def _length_error_gains(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """There are none where poses are not positions: metrics of them are refused."""
+    return math.nan, math.nan, math.nan
+
+
 @formula(equations.limb_parameters, PuuGeometry)
 def _limb_parameters(geometry, limb):  # type: ignore[no-untyped-def]
     """The strut: no limb has parameters of its own, or the platform would turn otherwise."""
@@ -533,12 +539,12 @@ REMARKS = (
     "The paper gives no L and no convention for the U-joint angle, so that its workspace figures (d from 31 "
     "to 142 mm, β up to 78°, 60.4° all round at d = 94 mm) can be approached, not reproduced.",
     "Its worked examples belong to h = 78.2843 mm, its workspace section to h = (R − r) tan θ = 70 mm: the "
-    "parameter o, 0 by default, is the difference, the height of P over the joints B_i.",
+    "parameter o, 0 by default, is the difference, the height of the joints B_i over P.",
     "Its direction of the rotation axis, n × Z, contradicts its components, Z × n, which are used; the minus "
     "sign in its second component of B_i breaks the symmetry it relies on and is left out.",
-    "Its condition of the second kind, b_i × L_i = 0, is not the one: `actuation` is the determinant of the "
+    "Its condition of the second kind, b_i × L_i = 0, is not the one: actuation is the determinant of the "
     "carriages' speeds against the three motions there are.",
-    "There are singularities inside the workspace that it claims: for θ = 45° the `rotation` locus at "
+    "There are singularities inside the workspace that it claims: for θ = 45° the rotation locus at "
     "β = 67.38° towards α = 90° and 74.17° towards α = 0°, whatever d and L.",
     "Poses with β = 0 have no α: give any; the Jacobian does not exist there. Tilts up to 120° are "
     "considered. Where d < h two poses share (α, β, d): the one with l + h cos(β/2) ≥ 0 is meant.",

@@ -49,16 +49,6 @@ def limb_strut(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
     raise NotImplementedError
 
 
-def limb_row(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
-    """Unit row s_i and b_i = s_i · u_i of one limb, see the implementation."""
-    raise NotImplementedError
-
-
-def limb_carriage(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
-    """Position q_i of one carriage on its rail (m), see the implementation."""
-    raise NotImplementedError
-
-
 def _limb_strut(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
     ax, ay, az = anchor(geometry, limb)
     ux, uy, uz = geometry.rail[limb]
@@ -69,19 +59,20 @@ def _limb_strut(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
     return (cx, cy, cz), root(square), root(sqr(geometry.strut[limb]) - square), (wx, wy, wz)
 
 
-def _limb_row(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+def _limb_row(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
+    """s_i · ẋ = (s_i · u_i) q̇_i: the strut keeps its length."""
     (cx, cy, cz), _, h, _ = limb_strut(geometry, limb, x, y, z)
     ux, uy, uz = geometry.rail[limb]
     length = geometry.strut[limb]
-    b = along_rail(geometry, limb, side) * h
+    b = along_rail(geometry, limb, sign) * h
     row = ((uy * cz - uz * cy + b * ux), (uz * cx - ux * cz + b * uy), (ux * cy - uy * cx + b * uz))
     return (row[0] / length, row[1] / length, row[2] / length), b / length
 
 
-def _limb_carriage(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+def _limb_carriage(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
     _, _, h, w = limb_strut(geometry, limb, x, y, z)
     ux, uy, uz = geometry.rail[limb]
-    return w[0] * ux + w[1] * uy + w[2] * uz - along_rail(geometry, limb, side) * h
+    return w[0] * ux + w[1] * uy + w[2] * uz - along_rail(geometry, limb, sign) * h
 
 
 def _strut_on_axis(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
@@ -93,10 +84,10 @@ def _strut_on_axis(geometry, limb, x, y, z):  # type: ignore[no-untyped-def]
     return w, root(square), root(sqr(geometry.strut[limb]) - square), w
 
 
-def _row_on_axis(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+def _row_on_axis(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
     _, _, h, _ = limb_strut(geometry, limb, x, y, z)
     length = geometry.strut[limb]
-    b = along_rail(geometry, limb, side) * h / length
+    b = along_rail(geometry, limb, sign) * h / length
     if limb == 0:
         return (b, y / length, z / length), b
     if limb == 1:
@@ -104,9 +95,9 @@ def _row_on_axis(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
     return (x / length, y / length, b), b
 
 
-def _carriage_on_axis(geometry, limb, side, x, y, z):  # type: ignore[no-untyped-def]
+def _carriage_on_axis(geometry, limb, sign, x, y, z):  # type: ignore[no-untyped-def]
     _, _, h, w = limb_strut(geometry, limb, x, y, z)
-    return w[0] - along_rail(geometry, limb, side) * h
+    return w[0] - along_rail(geometry, limb, sign) * h
 
 
 def _leg_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
@@ -131,21 +122,12 @@ def _mode_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     )
     if geometry.limited == 0.0:
         return swing1, swing2, swing3, swing1, swing2, swing3, swing1, swing2, swing3
-    q1 = limb_carriage(geometry, 0, k1, x, y, z)
-    q2 = limb_carriage(geometry, 1, k2, x, y, z)
-    q3 = limb_carriage(geometry, 2, k3, x, y, z)
+    q1 = equations.limb_actuator(geometry, 0, k1, x, y, z)
+    q2 = equations.limb_actuator(geometry, 1, k2, x, y, z)
+    q3 = equations.limb_actuator(geometry, 2, k3, x, y, z)
     low1, low2, low3 = geometry.lowest
     high1, high2, high3 = geometry.highest
     return q1 - low1, high1 - q1, q2 - low2, high2 - q2, q3 - low3, high3 - q3, swing1, swing2, swing3
-
-
-def _unit_velocity_map(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
-    """s_i · ẋ = (s_i · u_i) q̇_i: the strut keeps its length."""
-    k1, k2, k3 = mode.carriages
-    row1, b1 = limb_row(geometry, 0, k1, x, y, z)
-    row2, b2 = limb_row(geometry, 1, k2, x, y, z)
-    row3, b3 = limb_row(geometry, 2, k3, x, y, z)
-    return (row1, row2, row3), (b1, b2, b3), (1.0, 1.0, 1.0)
 
 
 def _serial_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
@@ -154,29 +136,17 @@ def _serial_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     return magnitude(b1), magnitude(b2), magnitude(b3)
 
 
-def _actuators(geometry, mode, motor, x, y, z):  # type: ignore[no-untyped-def]
-    """q_i (m)."""
-    k1, k2, k3 = mode.carriages
-    return (
-        limb_carriage(geometry, 0, k1, x, y, z),
-        limb_carriage(geometry, 1, k2, x, y, z),
-        limb_carriage(geometry, 2, k3, x, y, z),
-    )
-
-
 def rail_equations(geometry_class: type, *, on_axes: bool) -> None:
     """Register what all mechanisms of this kind have in common for a geometry with ``rail`` (unit vectors),
     ``strut``, ``limited``, ``lowest`` and ``highest``. It gives ``anchor``, ``along_rail`` and
     ``swing_margin`` itself. ``on_axes``: rails and anchors of the limbs are along x, y and z in turn,
     and ``swing_margin`` does not look at w."""
     formula(limb_strut, geometry_class)(_strut_on_axis if on_axes else _limb_strut)
-    formula(limb_row, geometry_class)(_row_on_axis if on_axes else _limb_row)
-    formula(limb_carriage, geometry_class)(_carriage_on_axis if on_axes else _limb_carriage)
+    formula(equations.limb_row, geometry_class)(_row_on_axis if on_axes else _limb_row)
+    formula(equations.limb_actuator, geometry_class)(_carriage_on_axis if on_axes else _limb_carriage)
     formula(equations.leg_margins, geometry_class)(_leg_margins)
     formula(equations.mode_margins, geometry_class)(_mode_margins)
-    formula(equations.unit_velocity_map, geometry_class)(_unit_velocity_map)
     formula(equations.serial_margins, geometry_class)(_serial_margins)
-    formula(equations.actuators, geometry_class)(_actuators)
 
 
 def rail_assemblies(

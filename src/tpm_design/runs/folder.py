@@ -179,18 +179,19 @@ def read_run(folder: Path) -> StoredRun:
                 where=f"{folder / LOG}:{number}",
                 remedy="Remove the line and resume the run: its design is evaluated again.",
             ) from None
-    summary = _read_summary(folder)
+    summary = read_summary(folder)
     finished = {} if summary.get("ending") == UNFINISHED else summary
     return StoredRun(folder, tuple(sorted(entries, key=lambda e: e.number)), finished)
 
 
 def written_by(folder: Path) -> str:
     """The version of tpm-design that began a run or resumed it last. Raises UsageError."""
-    versions = _read_summary(folder).get("versions", {})
+    versions = read_summary(folder).get("versions", {})
     return str(versions.get("tpm-design", "of an unknown version"))
 
 
-def _read_summary(folder: Path) -> Mapping[str, Any]:
+def read_summary(folder: Path) -> Mapping[str, Any]:
+    """The contents of run.json, empty where there is none. Raises UsageError where it is damaged."""
     path = folder / SUMMARY
     if not path.is_file():
         return {}

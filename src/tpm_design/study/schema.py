@@ -8,7 +8,9 @@ from typing import Any
 
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.metrics.base import Metric, Option
-from tpm_design.study.model import PYTHON_FILE, StudyModel
+from tpm_design.study.comparison import KEY as ARCHITECTURES
+from tpm_design.study.comparison import SHARED_ONLY
+from tpm_design.study.model import NAME, PYTHON_FILE, StudyModel
 from tpm_design.study.registries import Registries, registries
 
 Schema = dict[str, Any]
@@ -35,7 +37,28 @@ def study_schema() -> Schema:
     method["method"]["enum"] = sorted(known.optimizers)
     local = [name for name, optimizer in known.optimizers.items() if not optimizer.abilities.whole_space]
     method["polish"] = {"enum": [*sorted(local), None], "default": None}
+    _architectures(schema)
     return schema
+
+
+def _architectures(schema: Schema) -> None:
+    """A comparison says once what is shared, and each architecture the rest."""
+    own = [key for key in schema["properties"] if key not in SHARED_ONLY]
+    part = {
+        "type": "object",
+        "properties": {key: {"$ref": f"#/properties/{key}"} for key in own},
+        "additionalProperties": False,
+    }
+    schema["if"] = {"required": [ARCHITECTURES]}
+    schema["then"] = {"required": list(SHARED_ONLY)}
+    schema["else"] = {"required": schema.pop("required")}
+    schema["properties"][ARCHITECTURES] = {
+        "description": "in a comparison: label → what this architecture does not share with the others",
+        "type": "object",
+        "minProperties": 2,
+        "propertyNames": {"pattern": f"^{NAME}$"},
+        "additionalProperties": part,
+    }
 
 
 def _without_titles(node: Any) -> None:
