@@ -71,15 +71,23 @@ class RunWriter:
         self._log.flush()
         self._table.flush()
 
-    def finish(self, entries: Sequence[Entry], best: Sequence[Entry], summary: Mapping[str, Any]) -> None:
-        """Put both logs in order of ids, complete where a record was interrupted, and write the result."""
+    def finish(
+        self,
+        entries: Sequence[Entry],
+        result: Sequence[Entry],
+        summary: Mapping[str, Any],
+        *,
+        ranked: bool = True,
+    ) -> None:
+        """Put both logs in order of ids, complete where a record was interrupted, and write the result,
+        ``ranked`` or not as ``designs_table`` takes it."""
         self._table.close()
         self._log.close()
         ordered = sorted(entries, key=lambda entry: entry.number)
         text = csv_line(self._rows.headings()) + "".join(csv_line(self._rows.row(e)) for e in ordered)
         _replace(self.folder / TABLE, text)
         _replace(self.folder / LOG, "".join(map(_log_line, ordered)))
-        _replace(self.folder / DESIGNS, designs_table(self._problem, self._units, best))
+        _replace(self.folder / DESIGNS, designs_table(self._problem, self._units, result, ranked=ranked))
         _replace(self.folder / SUMMARY, json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
 
 
