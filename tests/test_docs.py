@@ -183,8 +183,9 @@ def test_the_numbers_shown_are_those_of_the_design_shown() -> None:
 
 
 def test_names_in_code_are_registered() -> None:
-    """Whatever looks like a metric or a method in the README's study and output is one."""
+    """Whatever looks like a metric, a method or a plan in the README's studies and output is one."""
     names = re.findall(r"(?:metric|method|polish|type): ([a-z_.]+)", README)
-    known = {*METRICS, *OPTIMIZERS, *MECHANISMS, "box"}
+    plans = {"grid", "list", "sobol", "latin_hypercube"}
+    known = {*METRICS, *OPTIMIZERS, *MECHANISMS, *plans, "box"}
     assert names
     assert set(names) <= known

@@ -30,7 +30,7 @@ def scatter_figure(reported: Reported) -> Figure | None:
     entries = reported.run.entries
     step = -(-len(entries) // MOST_DOTS)
     feasible = np.array([entry.evaluation.status == "feasible" for entry in entries])[::step]
-    figure = new_figure(1.4 + 2.3 * len(names), 1.2 + 1.7 * len(goals), "constrained")
+    figure = new_figure(1.4 + 2.3 * len(names), 1.2 + 2.0 * len(goals), "constrained")
     panels = figure.subplots(len(goals), len(names), sharex="col", sharey="row", squeeze=False)
     for column, name in enumerate(names):
         heading, given = parameter_values(reported, name)
@@ -43,7 +43,7 @@ def scatter_figure(reported: Reported) -> Figure | None:
                 )
             tidy(axes)
             if column == 0:
-                axes.set_ylabel(wrapped(_heading(reported, goal), 22), fontsize=SMALL)
+                axes.set_ylabel(wrapped(_heading(reported, goal), 31), fontsize=SMALL)
         panels[-1, column].set_xlabel(wrapped(heading, 26), fontsize=SMALL)
     panels[0, -1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=SMALL)
     title(figure, sweep_finding(reported))
@@ -95,7 +95,8 @@ def sweep_finding(reported: Reported) -> str:
     values = metric_values(reported, goals[0])
     unit = reported.study.units.name(goal_unit(reported.problem, goals[0]))
     unit = "" if unit == "-" else f" {unit}"
-    return f"{words}; {goals[0].label} is between {np.nanmin(values):.4g}{unit} and {np.nanmax(values):.4g}{unit}"
+    least, greatest = (f"{end(values):.4g}{unit}" for end in (np.nanmin, np.nanmax))
+    return f"{words}; {goals[0].label} is between {least} and {greatest}"
 
 
 def _measured(reported: Reported) -> list[Goal]:
