@@ -17,6 +17,7 @@ from tpm_design.mechanisms import MECHANISMS
 from tpm_design.metrics import METRICS
 from tpm_design.optimizers import OPTIMIZERS
 from tpm_design.report.escape import text
+from tpm_design.study.sweep_points import sweep_points
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -156,6 +157,17 @@ def test_the_study_shown_is_the_study_there_is() -> None:
     )
     for line in shown.splitlines():
         assert line.split("#")[0].strip() in study
+
+
+def test_the_plans_shown_are_plans(tmp_path: Path) -> None:
+    plans = re.findall(r"^\| `(\{type: .*\})` \|", README, re.MULTILINE)
+    study = (ROOT / "studies/01-uru-cube.yaml").read_text(encoding="utf-8")
+    sizes = []
+    for plan in plans:
+        path = tmp_path / "study.yaml"
+        path.write_text(re.sub("^sweep: .*$", f"sweep: {plan}", study, flags=re.MULTILINE), encoding="utf-8")
+        sizes.append(len(sweep_points(tpm.load_study(path))))
+    assert sizes == [9 * 4 * 2, 2, 256, 100]
 
 
 def test_the_python_example_runs() -> None:

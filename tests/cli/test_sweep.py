@@ -299,20 +299,49 @@ KIND = replace(KNOWN, name="broken", title="broken", build=build)
 """
 
 
-def test_a_mechanisms_own_file_that_breaks_at_some_points_ends_after_the_rows_are_written(
-    tmp_path: Path,
-) -> None:
-    (tmp_path / "broken.py").write_text(BROKEN, encoding="utf-8")
-    text = """\
+FORGETFUL = """
+from dataclasses import replace
+from itertools import count
+from tpm_design.mechanisms.orthoglide import KIND as KNOWN, build as known
+
+CALLS = count()
+
+
+def build(parameters, limits):
+    return known({"L": parameters["L"] * (1.0 + next(CALLS) * 2.0**-40)}, limits)
+
+
+KIND = replace(KNOWN, name="forgetful", title="forgetful", build=build)
+"""
+
+OWN_FILE = """\
 version: 1
-name: broken
+name: own
 units: {length: mm, angle: deg}
-mechanism: {file: broken.py, parameters: {L: {min: 300, max: 600}}, mode: {carriages: "+++"}}
+mechanism: {file: own.py, parameters: {L: {min: 300, max: 600}}, mode: {carriages: "+++"}}
 region: {type: box, size: [100, 100, 100], center: [0, 0, 0]}
 objectives: [{metric: total_link_length, sense: minimize}]
 sweep: {type: grid, parameters: {L: {num: 7}}}
 """
-    written(tmp_path, text)
+
+
+def test_a_hidden_state_is_told_after_the_rows_are_written(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(FORGETFUL, encoding="utf-8")
+    written(tmp_path, OWN_FILE)
+    done = process(["sweep", "study.yaml", "--allow-code", "--json", "--workers", "1"], tmp_path)
+    data = json.loads(done.stdout)
+    assert (done.returncode, data["feasible"], data["disagreements"]) == (1, 7, [0])
+    assert "Point 0 is different when evaluated again" in data["status"]
+    assert "depends on more than its design" in done.stderr
+    assert summary_of(tmp_path / data["run"])["sweep"]["disagreements"] == [0]
+    assert len(rows_of(tmp_path / data["run"] / "evaluations.csv")) == 7
+
+
+def test_a_mechanisms_own_file_that_breaks_at_some_points_ends_after_the_rows_are_written(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "own.py").write_text(BROKEN, encoding="utf-8")
+    written(tmp_path, OWN_FILE)
     assert process(["sweep", "study.yaml"], tmp_path).returncode == 2
     assert not (tmp_path / "results").exists()
     done = process(["sweep", "study.yaml", "--allow-code", "--json"], tmp_path)
@@ -320,7 +349,7 @@ sweep: {type: grid, parameters: {L: {num: 7}}}
     assert (data["feasible"], data["failed"]) == (5, 2)
     assert data["reasons"] == [{"reason": "RuntimeError: no such link", "points": 2, "first": 5}]
     assert done.returncode == 2
-    assert "broken.py:8" in done.stderr
+    assert "own.py:8" in done.stderr
     assert "no such link" in done.stderr
     rows = rows_of(tmp_path / data["run"] / "evaluations.csv")
     assert [row["status"] for row in rows] == ["feasible"] * 5 + ["failed"] * 2
