@@ -9,7 +9,7 @@ from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 
-NAMES = ("startup", "mechanisms", "enclosures", "volume", "certified_volume", "certificate", "study")
+NAMES = ("startup", "mechanisms", "enclosures", "volume", "certified_volume", "certificate", "sweep", "study")
 
 
 def main() -> None:

@@ -17,6 +17,7 @@ from tpm_design.mechanisms import MECHANISMS
 from tpm_design.metrics import METRICS
 from tpm_design.optimizers import OPTIMIZERS
 from tpm_design.report.escape import text
+from tpm_design.study.sweep_points import sweep_points
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -158,6 +159,17 @@ def test_the_study_shown_is_the_study_there_is() -> None:
         assert line.split("#")[0].strip() in study
 
 
+def test_the_plans_shown_are_plans(tmp_path: Path) -> None:
+    plans = re.findall(r"^\| `(\{type: .*\})` \|", README, re.MULTILINE)
+    study = (ROOT / "studies/01-uru-cube.yaml").read_text(encoding="utf-8")
+    sizes = []
+    for plan in plans:
+        path = tmp_path / "study.yaml"
+        path.write_text(re.sub("^sweep: .*$", f"sweep: {plan}", study, flags=re.MULTILINE), encoding="utf-8")
+        sizes.append(len(sweep_points(tpm.load_study(path))))
+    assert sizes == [9 * 4 * 2, 2, 256, 100]
+
+
 def test_the_python_example_runs() -> None:
     (example,) = blocks("python")
     done = subprocess.run(
@@ -183,8 +195,9 @@ def test_the_numbers_shown_are_those_of_the_design_shown() -> None:
 
 
 def test_names_in_code_are_registered() -> None:
-    """Whatever looks like a metric or a method in the README's study and output is one."""
+    """Whatever looks like a metric, a method or a plan in the README's studies and output is one."""
     names = re.findall(r"(?:metric|method|polish|type): ([a-z_.]+)", README)
-    known = {*METRICS, *OPTIMIZERS, *MECHANISMS, "box"}
+    plans = {"grid", "list", "sobol", "latin_hypercube"}
+    known = {*METRICS, *OPTIMIZERS, *MECHANISMS, *plans, "box"}
     assert names
     assert set(names) <= known

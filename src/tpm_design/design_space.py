@@ -30,15 +30,14 @@ class DesignSpace:
 
     def design(self, point: FloatArray) -> Design:
         """The design (SI) at a point (n,) of the unit cube."""
-        design: dict[str, float | str] = dict(self.fixed)
-        for variable, coordinate in zip(self.variables, point, strict=True):
-            share = min(1.0, max(0.0, float(coordinate)))
-            if variable.values:
-                count = len(variable.values)
-                design[variable.name] = variable.values[min(count - 1, int(share * count))]
-            else:
-                design[variable.name] = variable.lower + share * (variable.upper - variable.lower)
-        return with_ties(self.ties, self._mirrored(design))
+        return self.completed(
+            {v.name: value_at(v, float(c)) for v, c in zip(self.variables, point, strict=True)}
+        )
+
+    def completed(self, values: Design) -> Design:
+        """The design with these values (SI) of its variables: what is fixed and what is tied added, and
+        quantities that follow the mode's octant on its side. Values of fixed quantities take their place."""
+        return with_ties(self.ties, self._mirrored({**self.fixed, **values}))
 
     def point(self, design: Design) -> FloatArray:
         """The unit-cube point (n,) of a design; discrete values at the centre of their interval."""
@@ -92,6 +91,15 @@ class DesignSpace:
                 sign = self.octants[str(design["mode"])][CENTRE.index(variable.name)]
                 design[variable.name] = (sign or 1.0) * float(design[variable.name])
         return design
+
+
+def value_at(variable: Variable, coordinate: float) -> float | str:
+    """The value (SI) of a variable at its coordinate of the unit cube; beyond it, that of the nearest end."""
+    share = min(1.0, max(0.0, coordinate))
+    if variable.values:
+        count = len(variable.values)
+        return variable.values[min(count - 1, int(share * count))]
+    return variable.lower + share * (variable.upper - variable.lower)
 
 
 def octant_signs(modes: Mapping[str, Mapping[str, str]]) -> dict[str, tuple[float, float, float]]:

@@ -47,8 +47,8 @@ def options(
     """Dimensions for translational parallel robots: reachable, well conditioned, far from singularities.
 
     Exit codes: 0 done, 1 internal error, 2 wrong usage or invalid study, 3 no feasible design, 4 outside
-    tolerance of a baseline or of stored results, 5 requirement refuted or not proved, 130 interrupted:
-    --resume goes on.
+    tolerance of a baseline or of stored results, 5 requirement refuted or not proved, 6 points of a sweep
+    failed, 130 interrupted: --resume goes on.
     """
 
 
@@ -171,6 +171,41 @@ def optimize(
     return optimize_one(
         study, seed, budget, workers, resume, output, allow_code=allow_code, as_json=as_json, quiet=quiet
     )
+
+
+@app.command()
+@guarded
+def sweep(
+    study: Study,
+    shard: Annotated[
+        str, typer.Option(metavar="I/N", help="Every N-th point, from the I-th; `merge` joins the shards.")
+    ] = "1/1",
+    workers: Annotated[int | None, typer.Option(help="Threads; one per processor if left out.")] = None,
+    output: Annotated[Path, typer.Option(metavar="DIR", help="Folder for run folders.")] = Path("results"),
+    allow_code: AllowCode = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int | None:
+    """Evaluate every design of the study's `sweep:`; the run is written below results/."""
+    from tpm_design.cli.sweep import sweep_one
+
+    return sweep_one(study, shard, workers, output, allow_code=allow_code, as_json=as_json, quiet=quiet)
+
+
+@app.command()
+@guarded
+def merge(
+    runs: Annotated[
+        list[Path], typer.Argument(metavar="RUN ...", help="Run folders of all shards.", show_default=False)
+    ],
+    output: Annotated[Path, typer.Option(metavar="DIR", help="Folder for run folders.")] = Path("results"),
+    allow_code: AllowCode = False,
+    as_json: Json = False,
+) -> int | None:
+    """Join the shards of a sweep into one run."""
+    from tpm_design.cli.sweep import merge_shards
+
+    return merge_shards(runs, output, allow_code=allow_code, as_json=as_json)
 
 
 @app.command()

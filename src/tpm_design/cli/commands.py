@@ -229,14 +229,8 @@ def optimize_one(
     as_json: bool,
     quiet: bool,
 ) -> int | None:
-    if workers is not None and workers < 1:
-        raise UsageError(
-            f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
-        )
-    threads = workers or usable_processors()
+    threads = worker_threads(workers)
     comparison = load_comparison(path, allow_code=allow_code)
-    # short compiled calls by several threads: the usual 5 ms would make them wait for one another
-    sys.setswitchinterval(SWITCH_INTERVAL)
     if comparison is None:
         study = load_study(path, allow_code=allow_code).searched_with(seed=seed, budget=budget)
         folder = None if resume is None else run_to_resume(study, resume, output)
@@ -335,6 +329,18 @@ def _ending(run: Run) -> int | None:
         return NOT_PROVED
     feasible = run.best is not None and run.best.status == "feasible"
     return None if feasible else NOTHING_FEASIBLE
+
+
+def worker_threads(workers: int | None) -> int:
+    """How many threads evaluate, one per processor if None; prepares the interpreter for them. Raises
+    UsageError."""
+    if workers is not None and workers < 1:
+        raise UsageError(
+            f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
+        )
+    # short compiled calls by several threads: the usual 5 ms would make them wait for one another
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    return workers or usable_processors()
 
 
 def usable_processors() -> int:

@@ -15,7 +15,15 @@ import typer
 
 from tpm_design.errors import TpmDesignError
 
-INTERNAL, USAGE, NOTHING_FEASIBLE, OUTSIDE_TOLERANCE, NOT_PROVED, INTERRUPTED = 1, 2, 3, 4, 5, 130
+INTERNAL, USAGE, NOTHING_FEASIBLE, OUTSIDE_TOLERANCE, NOT_PROVED, POINTS_FAILED, INTERRUPTED = (
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    130,
+)
 
 Arguments = ParamSpec("Arguments")
 

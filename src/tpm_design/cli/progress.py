@@ -1,4 +1,4 @@
-"""Progress of a search: a bar on a terminal, otherwise a line now and then, on standard error."""
+"""Progress of a search or a sweep: a bar on a terminal, otherwise a line now and then, on standard error."""
 
 from __future__ import annotations
 
@@ -20,14 +20,36 @@ def search_progress(
     problem: Problem, units: Units, budget: int, *, quiet: bool
 ) -> Iterator[Callable[[Entry], None]]:
     """A function to be called with each evaluation."""
-    best = _Best(problem, units)
+    with _progress("Searching", budget, _Best(problem, units).update, quiet=quiet) as watch:
+        yield watch
+
+
+@contextmanager
+def sweep_progress(count: int, *, quiet: bool) -> Iterator[Callable[[Entry], None]]:
+    """A function to be called with each evaluation of a sweep of so many points."""
+    failed = 0
+
+    def update(entry: Entry) -> str:
+        nonlocal failed
+        failed += entry.evaluation.status == "failed"
+        return f"{failed} failed"
+
+    with _progress("Evaluating", count, update, quiet=quiet) as watch:
+        yield watch
+
+
+@contextmanager
+def _progress(
+    verb: str, count: int, update: Callable[[Entry], str], *, quiet: bool
+) -> Iterator[Callable[[Entry], None]]:
+    """``update`` gives the words that follow the number of evaluations."""
     if quiet:
         yield lambda entry: None
     elif sys.stderr.isatty():
-        with _bar(budget, best) as watch:
+        with _bar(count, update) as watch:
             yield watch
     else:
-        yield _lines(budget, best)
+        yield _lines(verb, count, update)
 
 
 class _Best:
@@ -57,7 +79,7 @@ class _Best:
 
 
 @contextmanager
-def _bar(budget: int, best: _Best) -> Iterator[Callable[[Entry], None]]:
+def _bar(count: int, update: Callable[[Entry], str]) -> Iterator[Callable[[Entry], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -70,19 +92,20 @@ def _bar(budget: int, best: _Best) -> Iterator[Callable[[Entry], None]]:
         console=Console(stderr=True),
         transient=True,
     ) as progress:
-        task = progress.add_task("compiling the equations on first use", total=budget)
-        yield lambda entry: progress.update(task, completed=entry.number + 1, description=best.update(entry))
+        task = progress.add_task("compiling the equations on first use", total=count)
+        yield lambda entry: progress.update(task, advance=1, description=update(entry))
 
 
-def _lines(budget: int, best: _Best) -> Callable[[Entry], None]:
-    print("Searching; the equations are compiled on first use.", file=sys.stderr, flush=True)
-    last = time.monotonic()
+def _lines(verb: str, count: int, update: Callable[[Entry], str]) -> Callable[[Entry], None]:
+    print(f"{verb}; the equations are compiled on first use.", file=sys.stderr, flush=True)
+    last, done = time.monotonic(), 0
 
     def watch(entry: Entry) -> None:
-        nonlocal last
-        text = best.update(entry)
+        nonlocal last, done
+        done += 1
+        text = update(entry)
         if time.monotonic() - last >= SECONDS_BETWEEN_LINES:
             last = time.monotonic()
-            print(f"{entry.number + 1} of {budget} evaluations, {text}", file=sys.stderr, flush=True)
+            print(f"{done} of {count} evaluations, {text}", file=sys.stderr, flush=True)
 
     return watch

@@ -16,6 +16,7 @@ from tpm_design.report.reported import Reported, best_context
 from tpm_design.report.rooms import rooms_figure, rooms_finding
 from tpm_design.report.style import save
 from tpm_design.report.survey import conditioning_shown, has_conditioning, survey
+from tpm_design.report.sweep_figures import map_figure, scatter_figure, sweep_finding
 from tpm_design.units import Units
 
 FIGURES = "figures"
@@ -34,9 +35,12 @@ class Picture:
 
 def pictures(reported: Reported) -> tuple[Picture, ...]:
     """What there is to draw of a run, in the order of the report."""
-    rooms, course = rooms_figure(reported), convergence_figure(reported)
+    rooms = rooms_figure(reported)
+    course = None if reported.swept else convergence_figure(reported)
     context = best_context(reported)
     found = [] if context is None else _drawings(context, reported.study.units)
+    if reported.swept:
+        found += _sweep_pictures(reported)
     found += _slice_pictures(reported)
     if rooms is not None:
         found.append(
@@ -72,6 +76,22 @@ def _drawings(context: Context, units: Units) -> list[Picture]:
             caption = "Limb 1 carries the names and its own dimensions; the links are to scale."
             return [Picture(DRAWING, f"{machine.kind.title} {where}", caption, figure)]
     return []
+
+
+def _sweep_pictures(reported: Reported) -> list[Picture]:
+    figures = {
+        "sweep.png": (scatter_figure(reported), "Every metric against every swept quantity."),
+        "sweep-map.png": (
+            map_figure(reported),
+            "Every metric over the grid. A dot is a feasible design; a pale cell has no value.",
+        ),
+    }
+    finding = sweep_finding(reported)
+    return [
+        Picture(file, finding, caption, figure)
+        for file, (figure, caption) in figures.items()
+        if figure is not None
+    ]
 
 
 def _slice_pictures(reported: Reported) -> list[Picture]:

@@ -13,6 +13,7 @@ from tpm_design.report.escape import code, code_cell, table, text
 from tpm_design.report.figures import DRAWING, FIGURES, Picture
 from tpm_design.report.readings import AT_BOUND, at_end, limiting, nearest_constraint, readings
 from tpm_design.report.reported import Reported
+from tpm_design.report.swept import sweep_lines
 from tpm_design.report.words import MOST_LISTED, asked, centre_text, options_text, range_text, shape_text
 from tpm_design.runs.folder import DESIGNS, LOG, STUDY, SUMMARY, TABLE
 from tpm_design.runs.search import Entry
@@ -34,12 +35,13 @@ def report_markdown(reported: Reported, pictures: Sequence[Picture]) -> str:
     sections = [
         _head(reported),
         _question(reported),
+        sweep_lines(reported) if reported.swept else [],
         _design(reported),
         _figures("Mechanism", [picture for picture in pictures if picture.file == DRAWING]),
         _metrics(reported),
         certificate_lines(reported),
-        _limits(reported),
-        _search(reported),
+        [] if reported.swept else _limits(reported),
+        _evaluated(reported) if reported.swept else _search(reported),
         _figures("Figures", [picture for picture in pictures if picture.file != DRAWING]),
         _caveats(reported),
         _files(reported),
@@ -245,14 +247,6 @@ def _search(reported: Reported) -> list[str]:
     polish = f", polished by {code(settings.polish)}" if settings.polish else ""
     feasible = sum(entry.evaluation.status == "feasible" for entry in entries)
     failed = sum(entry.evaluation.status == "failed" for entry in entries)
-    seconds = sum(entry.evaluation.seconds for entry in entries)
-    wall, resumed = summary.get("seconds"), summary.get("resumed_after")
-    if isinstance(resumed, int):
-        time = f"{seconds:.3g} s evaluating (summed over workers); resumed after {resumed} evaluations"
-    elif isinstance(wall, int | float) and math.isfinite(wall):
-        time = f"{wall:.3g} s wall time, {seconds:.3g} s of it evaluating (summed over workers)"
-    else:
-        time = f"{seconds:.3g} s evaluating (summed over workers); the wall time is not known"
     lines = [
         "## How it was found",
         "",
@@ -260,11 +254,26 @@ def _search(reported: Reported) -> list[str]:
         f"- seed {settings.seed}, budget {settings.budget} evaluations",
         f"- {len(entries)} evaluations: {feasible} feasible, {failed} failed",
         *_rounds(entries),
-        f"- {time}",
+        f"- {_time(reported)}",
     ]
     lines += [f"- {words}" for words in _provenance(summary)]
     lines += [f"- {text(str(remark))}" for remark in summary.get("remarks") or ()]
     return lines
+
+
+def _evaluated(reported: Reported) -> list[str]:
+    lines = ["## How it was evaluated", "", f"- {_time(reported)}"]
+    return lines + [f"- {words}" for words in _provenance(reported.run.summary)]
+
+
+def _time(reported: Reported) -> str:
+    wall, resumed = reported.run.summary.get("seconds"), reported.run.summary.get("resumed_after")
+    seconds = sum(entry.evaluation.seconds for entry in reported.run.entries)
+    if isinstance(resumed, int):
+        return f"{seconds:.3g} s evaluating (summed over workers); resumed after {resumed} evaluations"
+    if isinstance(wall, int | float) and math.isfinite(wall):
+        return f"{wall:.3g} s wall time, {seconds:.3g} s of it evaluating (summed over workers)"
+    return f"{seconds:.3g} s evaluating (summed over workers); the wall time is not known"
 
 
 def _rounds(entries: Sequence[Entry]) -> Iterable[str]:

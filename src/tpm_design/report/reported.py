@@ -11,16 +11,18 @@ from tpm_design.problem import Problem, design_context
 from tpm_design.runs.folder import STUDY, StoredRun, read_run
 from tpm_design.runs.search import Entry, best_entry
 from tpm_design.study import Study, load_study
+from tpm_design.study.sweep_points import sweep_points
 
 
 @dataclass(frozen=True)
 class Reported:
     """A run and the study it answers. ``best``: the best feasible entry, else the one of least violation;
-    None where nothing was evaluated."""
+    None where nothing was evaluated. ``swept``: whether it is a sweep and no search."""
 
     study: Study
     run: StoredRun
     best: Entry | None
+    swept: bool
 
     @property
     def problem(self) -> Problem:
@@ -41,7 +43,15 @@ def read_reported(folder: Path, *, allow_code: bool = False) -> Reported:
     UsageError, StudyError or PlugInError."""
     run = read_run(folder)
     study = load_study(folder / STUDY, allow_code=allow_code)
-    return Reported(study, run, run.best or best_entry(study.problem, run.entries))
+    return Reported(study, run, run.best or best_entry(study.problem, run.entries), _is_sweep(study, run))
+
+
+def _is_sweep(study: Study, run: StoredRun) -> bool:
+    """As run.json says; of a run that was cut short, whether every row has the design of the study's plan."""
+    if run.summary or study.sweep is None or not run.entries:
+        return "sweep" in run.summary
+    designs = {point.number: point.design for point in sweep_points(study)}
+    return all(designs.get(entry.number) == entry.evaluation.design for entry in run.entries)
 
 
 def best_context(reported: Reported) -> Context | None:

@@ -94,11 +94,19 @@ class RunWriter:
         self._log.close()
         self._table.close()
 
-    def finish(self, entries: Sequence[Entry], best: Sequence[Entry], summary: Mapping[str, Any]) -> None:
-        """Put both logs in order of ids, complete where a record was interrupted, and write the result."""
+    def finish(
+        self,
+        entries: Sequence[Entry],
+        result: Sequence[Entry],
+        summary: Mapping[str, Any],
+        *,
+        ranked: bool = True,
+    ) -> None:
+        """Put both logs in order of ids, complete where a record was interrupted, and write the result,
+        ``ranked`` or not as ``designs_table`` takes it."""
         self.close()
         self._write_logs(sorted(entries, key=lambda entry: entry.number))
-        replace_file(self.folder / DESIGNS, designs_table(self._problem, self._units, best))
+        replace_file(self.folder / DESIGNS, designs_table(self._problem, self._units, result, ranked=ranked))
         replace_file(self.folder / SUMMARY, _summary_text(summary))
 
     def _write_logs(self, entries: Sequence[Entry]) -> None:

@@ -113,23 +113,27 @@ def metric_cells(evaluation: Evaluation, columns: Sequence[Column], units: Units
     ]
 
 
-def designs_table(problem: Problem, units: Units, best: Sequence[Entry]) -> str:
-    """``designs.csv``: one row per optimum, best first, each metric followed by its numeric error. No
-    times, paths or run ids, so that equal searches give equal files."""
+def designs_table(problem: Problem, units: Units, result: Sequence[Entry], *, ranked: bool = True) -> str:
+    """``designs.csv``: one row per entry, each metric followed by its numeric error. ``ranked``: the entries
+    are optima, best first, and a first column counts them. No times, paths or run ids, so that equal
+    searches give equal files."""
     parameters, metrics = parameter_columns(problem, units), metric_columns(problem, units)
-    headings = ["rank", "id", "status", *(column.heading for column in parameters)]
+    notes = note_columns(problem)
+    headings = ["id", "status", *(column.heading for column in parameters)]
     for column in metrics:
         headings += [column.heading, units.heading(f"{column.name} error", column.unit)]
-    rows = [[*headings, *note_columns(problem), "violation [-]"]]
-    for rank, entry in enumerate(best, start=1):
+    rows = [[*headings, *notes, "violation [-]"]]
+    for entry in result:
         evaluation = entry.evaluation
-        row = [str(rank), str(entry.number), evaluation.status]
+        row = [str(entry.number), evaluation.status]
         row += design_cells(evaluation, parameters, units)
         for column, cell in zip(metrics, metric_cells(evaluation, metrics, units), strict=True):
             error = evaluation.errors.get(column.name, math.nan)
             row += [cell, number(units.from_si(error, column.unit)) if cell else ""]
-        row += [evaluation.notes.get(name, "") for name in note_columns(problem)]
+        row += [evaluation.notes.get(name, "") for name in notes]
         rows.append([*row, number(evaluation.violation)])
+    if ranked:
+        rows = [["rank" if place == 0 else str(place), *row] for place, row in enumerate(rows)]
     return "".join(csv_line(row) for row in rows)
 
 
