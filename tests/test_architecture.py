@@ -33,6 +33,7 @@ ROOMS = (
     "design_space",
     "certificates",
     "optimizers",
+    "synthesis",
     "runs",
     "study",
     "report",
@@ -60,6 +61,7 @@ OWNERS = {
     "nlopt": {"optimizers"},
     "flint": {"checker"},
     "matplotlib": {"report"},
+    "cvxpy": {"optimizers"},
 }
 """Libraries that only these rooms know."""
 

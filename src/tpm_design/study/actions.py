@@ -15,6 +15,7 @@ from tpm_design.certificates.verdict import Verdict
 from tpm_design.errors import UsageError, did_you_mean
 from tpm_design.problem import Design, Evaluation, evaluate, with_ties
 from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, text_hash
+from tpm_design.runs.optimality import gap_of, with_bound
 from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, search
 from tpm_design.runs.rounds import Proving, search_certified
 from tpm_design.runs.search import Entry
@@ -94,6 +95,7 @@ def optimize_study(
     else:
         proving = Proving(study.certification.tolerance, study.certification.boxes)
         result = search_certified(study.problem, plan, proving, workers=workers, record=record)
+    result = with_bound(study.problem, plan, result)
     if writer is not None and folder is not None:
         if result.verdict is not None:
             data = document(study.problem, study.resolved(), study.study_hash, result.verdict)
@@ -110,6 +112,7 @@ def optimize_study(
             "budget": plan.budget,
             "workers": workers,
             "remarks": list(result.remarks),
+            **_bound_data(result),
             **({} if study.certification is None else _rounds_data(result)),
             "study_hash": study.study_hash,
             "study_file_hash": text_hash(study_text),
@@ -120,6 +123,15 @@ def optimize_study(
     best = None if result.best is None else result.best.evaluation
     table = evaluations_frame(study, result.entries)
     return Run(best, table, result.status, result, folder, result.verdict)
+
+
+def _bound_data(result: SearchResult) -> dict[str, Any]:
+    """For run.json: the lower bound on the objective (SI; null: nothing reaches the region), and by which share
+    the best design is above it."""
+    if result.bound is None:
+        return {}
+    least = result.bound.least if result.bound.reachable else None
+    return {"bound": {"objective": result.bound.goal, "least": least, "gap": gap_of(result)}}
 
 
 def _rounds_data(result: SearchResult) -> dict[str, Any]:
