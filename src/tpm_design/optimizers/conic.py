@@ -1,8 +1,9 @@
 """Linear costs over second-order and semidefinite cones, with a lower bound that does not trust the solver.
 
-The bound is weak duality, worked out again from the solver's multipliers y: with each y_k moved into its cone,
-c·x ≥ (c − Σ A_kᵀ y_k)·x − Σ b_k·y_k wherever all A_k x + b_k lie in theirs, and the first term is least at an
-end of each variable's range. So it holds however early or badly the solver stopped, and is merely low then.
+The bound is weak duality, worked out again from the solver's multipliers y: with each y_k moved into its
+cone, c·x ≥ (c − Σ A_kᵀ y_k)·x − Σ b_k·y_k wherever all A_k x + b_k lie in theirs, and the first term is least
+at an end of each variable's range. So it holds however early or badly the solver stopped, and is merely low
+then.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ ROUNDING = 1e-13
 
 @dataclass(frozen=True)
 class Cones:
-    """K cones of one kind: ``matrix`` (m, n) x + ``offsets`` (K, m) lie in them, each row of ``offsets`` in one.
+    """K cones of one kind: ``matrix`` (m, n) x + ``offsets`` (K, m) lie in them, each row of ``offsets`` in
+    one.
 
     "non-negative": all m values ≥ 0; "second-order": the first ≥ the norm of the others; "semidefinite": the
     rows of a symmetric matrix one after the other.
@@ -75,7 +77,9 @@ def _solved(program: ConicProgram) -> tuple[str, FloatArray | None, list[FloatAr
     x = cp.Variable(program.cost.size)
     within = [x >= program.lower, x <= program.upper]
     stated = [_constraints(cp, cones, x) for cones in program.cones]
-    problem = cp.Problem(cp.Minimize(program.cost @ x), [*within, *(one for some in stated for one in some)])
+    problem: Any = cp.Problem(
+        cp.Minimize(program.cost @ x), [*within, *(one for some in stated for one in some)]
+    )
     try:
         with warnings.catch_warnings():
             # an inaccurate end only lowers the bound

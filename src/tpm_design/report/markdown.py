@@ -236,8 +236,8 @@ def _optimality(reported: Reported) -> list[str]:
         "",
         text(words),
         "",
-        "The bound is the optimum of a convex relaxation: outer reach over the whole region, octant, ranges and "
-        "ties; inner reach, elbows, singularities and the other constraints can only lengthen the links.",
+        "The bound is the optimum of a convex relaxation: outer reach over the whole region, octant, ranges "
+        "and ties; inner reach, elbows, singularities and other constraints can only lengthen the links.",
     ]
 
 

@@ -11,12 +11,12 @@ from tpm_design.runs.optimize import SearchPlan, SearchResult
 from tpm_design.synthesis.bound import reach_bound
 
 OPTIMAL = 1e-5
-"""Gap up to which a design of the relaxation counts as the optimum: it keeps off the bounds of reach by less."""
+"""Gap up to which a design of the relaxation counts as the optimum: it keeps a little off the bounds."""
 
 
 def with_bound(problem: Problem, plan: SearchPlan, result: SearchResult) -> SearchResult:
-    """The result with a lower bound on its objective where there is one; the status says what of the relaxation
-    is left, where that was the method."""
+    """The result with a lower bound on its objective where there is one; the status says what of the
+    relaxation is left, where that was the method."""
     try:
         bound = reach_bound(problem)
     except RefusedError as error:

@@ -126,8 +126,8 @@ def optimize_study(
 
 
 def _bound_data(result: SearchResult) -> dict[str, Any]:
-    """For run.json: the lower bound on the objective (SI; null: nothing reaches the region), and by which share
-    the best design is above it."""
+    """For run.json: the lower bound on the objective (SI; null: nothing reaches the region), and by which
+    share the best design is above it."""
     if result.bound is None:
         return {}
     least = result.bound.least if result.bound.reachable else None

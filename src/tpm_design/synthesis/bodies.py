@@ -1,4 +1,4 @@
-"""Regions as convex hulls of points and ellipsoids: what a convex program must hold is held at these alone."""
+"""Regions as convex hulls of points and ellipsoids: what is convex holds over all if it holds on these."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Body:
-    """A region about its centre (m). ``points`` (N, 3); ``ellipsoids``: {middle + axes u : |u| ≤ 1}, the middle
-    (3,) and the half axes as columns (3, k). The region lies in their convex hull and holds them all."""
+    """A region about its centre (m). ``points`` (N, 3); ``ellipsoids``: {middle + axes u : |u| ≤ 1}, the
+    middle (3,) and the half axes as columns (3, k). The region holds them all and lies in their hull."""
 
     points: FloatArray
     ellipsoids: tuple[tuple[FloatArray, FloatArray], ...] = ()

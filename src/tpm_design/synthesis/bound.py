@@ -18,14 +18,14 @@ from tpm_design.synthesis.relaxation import Relaxation, octants, refusal, relaxa
 FloatArray = NDArray[np.float64]
 
 INWARD = (1e-8, 1e-6, 1e-4)
-"""By how much relaxed designs keep off the bounds of reach, as shares of the largest length: what lies on a bound
-misses it by a rounding, or by the numeric error of a metric."""
+"""By how much relaxed designs keep off the bounds of reach, as shares of the largest length: what lies on a
+bound misses it by a rounding, or by the numeric error of a metric."""
 
 
 @dataclass(frozen=True)
 class ReachBound:
-    """No design within the study's ranges that reaches its region has less than ``least`` (m) of the objective
-    ``goal``; infinite: no such design reaches it."""
+    """No design within the study's ranges that reaches its region has less than ``least`` (m) of the
+    objective ``goal``; infinite: no such design reaches it."""
 
     goal: str
     least: float
@@ -41,7 +41,8 @@ class ReachBound:
 
 
 def reach_bound(problem: Problem) -> ReachBound | None:
-    """The bound, None where the problem has no convex relaxation. Raises RefusedError where the solver fails."""
+    """The bound, None where the problem has no convex relaxation. Raises RefusedError where the solver
+    fails."""
     if refusal(problem) is not None:
         return None
     relaxed = [relaxation(problem, octant) for octant in octants(problem)]
@@ -50,9 +51,9 @@ def reach_bound(problem: Problem) -> ReachBound | None:
 
 
 def relaxed_designs(problem: Problem, start: Design, most: int) -> list[Design]:
-    """Designs with the shortest links that reach the region by outer reach alone: a few for each choice of the
-    discrete variables, each a little farther inside than the one before; at most ``most``. What has no part in
-    the relaxation is as in ``start``.
+    """Designs with the shortest links that reach the region by outer reach alone: a few for each choice of
+    the discrete variables, each a little farther inside than the one before; at most ``most``. What has no
+    part in the relaxation is as in ``start``.
 
     Raises RefusedError where the solver fails.
     """
@@ -65,7 +66,9 @@ def _relaxed_designs(problem: Problem, start: Design) -> Iterator[Design]:
     signs = octant_signs(problem.modes)
     known: dict[object, dict[str, float] | None] = {}
     for values in itertools.product(*(variable.values for variable in discrete)):
-        chosen = {variable.name: value for variable, value in zip(discrete, values, strict=True)}
+        chosen: dict[str, float | str] = {
+            variable.name: value for variable, value in zip(discrete, values, strict=True)
+        }
         held = replace(problem, variables=continuous, fixed={**problem.fixed, **chosen})
         octant = signs[str(held.fixed["mode"])]
         lengths = tuple(

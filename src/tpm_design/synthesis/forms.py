@@ -76,10 +76,10 @@ class Draft:
     def norm_over_ellipsoid(self, across: Sequence[Form], within: Form, axes: FloatArray) -> None:
         """‖across + axes u‖ ≤ within for every |u| ≤ 1, exactly; ``axes`` (len(across), k).
 
-        Where the image of the ball is a ball of radius β in a subspace, the worst u points away in it: second-order
-        cones. Else by the S-lemma, as in L. El Ghaoui, H. Lebret, SIAM J. Matrix Analysis 18(4), 1997: there is
-        a τ such that [[within − τ, 0, acrossᵀ], [0, τ I, axesᵀ], [across, axes, within I]] is positive
-        semidefinite.
+        Where the image of the ball is a ball of radius β in a subspace, the worst u points away in it:
+        second-order cones. Else by the S-lemma, as in L. El Ghaoui, H. Lebret, SIAM J. Matrix Analysis 18(4),
+        1997: there is a τ such that [[within − τ, 0, acrossᵀ], [0, τ I, axesᵀ], [across, axes, within I]] is
+        positive semidefinite.
         """
         within = within + -self.inward
         rows, count = axes.shape
@@ -112,7 +112,7 @@ class Draft:
         self._stated.append(("semidefinite", forms, np.zeros((1, side * side))))
 
     def program(self, cost: Form, unit: float) -> ConicProgram:
-        """The program in lengths of ``unit`` (m), least ``cost``; its variables in the order of ``ranges``."""
+        """The program of least ``cost`` in lengths of ``unit`` (m); variables in the order of ``ranges``."""
         names = list(self.ranges)
         lower, upper = (np.array([self.ranges[name][end] / unit for name in names]) for end in (0, 1))
 

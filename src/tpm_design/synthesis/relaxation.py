@@ -1,7 +1,7 @@
 """A study's question about link lengths as a convex program: outer reach, octant, ranges and ties.
 
-Everything that reaches the region satisfies it, so that its least value is a lower bound. Inner reach, elbows,
-singularities and all that is asked besides are not in it.
+Everything that reaches the region satisfies it, so that its least value is a lower bound. Inner reach,
+elbows, singularities and all that is asked besides are not in it.
 """
 
 from __future__ import annotations
@@ -95,7 +95,8 @@ def length_form(problem: Problem, name: str, limb: int) -> Form:
 
 
 def relaxation(problem: Problem, octant: Octant, *, inward: float = 0.0) -> Relaxation:
-    """The convex program of a problem that ``refusal`` finds nothing against, for working modes of one octant.
+    """The convex program of a problem that ``refusal`` finds nothing against, for working modes of one
+    octant.
 
     Discrete lengths may take every value between their ends. ``inward``: every constraint is to be met by so
     much, as a share of the unit.
