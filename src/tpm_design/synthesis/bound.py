@@ -62,13 +62,12 @@ def relaxed_designs(problem: Problem, start: Design, most: int) -> list[Design]:
 
 def _relaxed_designs(problem: Problem, start: Design) -> Iterator[Design]:
     discrete = [variable for variable in problem.variables if variable.values]
+    choices: list[tuple[float | str, ...]] = [variable.values for variable in discrete]
     continuous = tuple(variable for variable in problem.variables if not variable.values)
     signs = octant_signs(problem.modes)
     known: dict[object, dict[str, float] | None] = {}
-    for values in itertools.product(*(variable.values for variable in discrete)):
-        chosen: dict[str, float | str] = {
-            variable.name: value for variable, value in zip(discrete, values, strict=True)
-        }
+    for values in itertools.product(*choices):
+        chosen = {variable.name: value for variable, value in zip(discrete, values, strict=True)}
         held = replace(problem, variables=continuous, fixed={**problem.fixed, **chosen})
         octant = signs[str(held.fixed["mode"])]
         lengths = tuple(
