@@ -465,6 +465,17 @@ def test_the_relaxation_is_the_optimum_where_its_design_meets_everything(tmp_pat
     assert "Optimal" in run.status
 
 
+def test_a_design_that_is_not_proved_is_not_called_optimal(tmp_path: Path) -> None:
+    """At the optimum a limb is stretched: nothing is left for tolerances."""
+    run = study_of(tmp_path, f"{URU}certify: {{tolerance: {{f: 1}}}}\n", REACH_ALONE).optimize()
+    assert run.best is not None
+    assert run.best.status == "feasible"
+    assert run.verdict is not None
+    assert run.verdict.outcome != "proved"
+    assert "Optimal" not in run.status
+    assert "not a design: its own is not proved" in run.status
+
+
 def test_otherwise_it_is_a_lower_bound_and_names_what_is_missed(tmp_path: Path) -> None:
     run = study_of(tmp_path, URU).optimize()
     assert run.best is not None

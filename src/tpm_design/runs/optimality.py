@@ -33,15 +33,16 @@ def with_bound(problem: Problem, plan: SearchPlan, result: SearchResult) -> Sear
 
 
 def _of_relaxation(result: SearchResult) -> list[str]:
-    gap = gap_of(result)
-    if gap is not None:
-        if gap > OPTIMAL:
-            return []
-        return ["Optimal: no design within the ranges that reaches the region has shorter links."]
-    if result.best is None or result.best.evaluation.status == "failed":
+    gap, best = gap_of(result), result.best
+    if best is None or best.evaluation.status == "failed" or (gap is not None and gap > OPTIMAL):
         return []
-    missed = [label for label, slack in result.best.evaluation.slacks.items() if slack < 0.0]
-    return [f"The relaxation gives a lower bound, not a design: its own misses {', '.join(missed)}."]
+    lower = "The relaxation gives a lower bound, not a design: its own"
+    if gap is None:
+        missed = [label for label, slack in best.evaluation.slacks.items() if slack < 0.0]
+        return [f"{lower} misses {', '.join(missed)}."]
+    if result.rounds and (result.verdict is None or result.verdict.outcome != "proved"):
+        return [f"{lower} is not proved."]
+    return ["Optimal: no design within the ranges that reaches the region has shorter links."]
 
 
 def gap_of(result: SearchResult) -> float | None:
