@@ -485,6 +485,15 @@ def test_otherwise_it_is_a_lower_bound_and_names_what_is_missed(tmp_path: Path) 
     assert "misses coverage" in run.status
 
 
+def test_a_spent_budget_is_told(tmp_path: Path) -> None:
+    """Three designs for each of two gear ratios."""
+    ratios = ("k: 1}", "k: {values: [1, 2]}}")
+    for budget, ending in ((6, "converged"), (5, "budget spent")):
+        run = study_of(tmp_path, URU, REACH_ALONE, ratios).optimize(budget=budget)
+        assert len(run.result.entries) == budget
+        assert run.result.ending == ending
+
+
 def test_a_study_that_nothing_reaches_is_told_so(tmp_path: Path) -> None:
     run = study_of(tmp_path, URU, ("max: 600", "max: 140")).optimize()
     assert run.best is None

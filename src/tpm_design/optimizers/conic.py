@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from tpm_design.errors import RefusedError
 
 FloatArray = NDArray[np.float64]
+ConeKind = Literal["non-negative", "second-order", "semidefinite"]
 
 ROUNDING = 1e-13
 """Share of the sum of all magnitudes in the bound by which it is lowered for rounding."""
@@ -32,7 +33,7 @@ class Cones:
     rows of a symmetric matrix one after the other.
     """
 
-    kind: Literal["non-negative", "second-order", "semidefinite"]
+    kind: ConeKind
     matrix: FloatArray
     offsets: FloatArray
 

@@ -134,7 +134,8 @@ class UnitSearch:
     def relaxed_optima(self) -> FloatArray:
         """Points (N, n) of the convex relaxation's designs, see ``synthesis``. Raises RefusedError where the
         solver fails."""
-        designs = relaxed_designs(self.log.problem, self.space.design(self.start), self.limit)
+        # one more than can be evaluated: so what is left out ends as a spent budget
+        designs = relaxed_designs(self.log.problem, self.space.design(self.start), self.limit + 1)
         points = [self.space.point(design) for design in designs]
         return np.array(points, dtype=np.float64).reshape(-1, self.dimension)
 

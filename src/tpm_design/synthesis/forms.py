@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.optimizers.conic import Cones, ConicProgram
+from tpm_design.optimizers.conic import ConeKind, Cones, ConicProgram
 
 FloatArray = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Draft:
 
     inward: float = 0.0
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
-    _stated: list[tuple[str, tuple[Form, ...], FloatArray]] = field(default_factory=list)
+    _stated: list[tuple[ConeKind, tuple[Form, ...], FloatArray]] = field(default_factory=list)
 
     def helper(self, highest: float) -> Form:
         """A variable of its own between 0 and ``highest``."""
@@ -123,5 +123,5 @@ class Draft:
         for kind, forms, offsets in self._stated:
             constants = np.array([form.constant for form in forms])
             matrix = np.array([row(form) for form in forms])
-            cones.append(Cones(kind, matrix, (constants + offsets) / unit))  # type: ignore[arg-type]
+            cones.append(Cones(kind, matrix, (constants + offsets) / unit))
         return ConicProgram(row(cost), lower, upper, tuple(cones))
