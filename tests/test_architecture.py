@@ -33,6 +33,7 @@ ROOMS = (
     "design_space",
     "certificates",
     "optimizers",
+    "synthesis",
     "runs",
     "study",
     "report",
@@ -61,6 +62,7 @@ OWNERS = {
     "nlopt": {"optimizers"},
     "flint": {"checker"},
     "matplotlib": {"report"},
+    "cvxpy": {"optimizers"},
 }
 """Libraries that only these rooms know."""
 

@@ -162,6 +162,9 @@ def _optimizer_text(method: Optimizer) -> str:
         ["workers help", "yes" if able.batch else "no"],
         ["variables", f"{able.smallest_dimension} to {most}"],
     ]
+    if able.relaxation:
+        rows[1] = ["constraints", "leaves out all but reach, and says which its designs miss"]
+        rows.append(["needs", "least total_link_length as objective, a region to be reached as a whole"])
     return f"{method.name}: {method.description}\nSource: {method.source}\n\n" + table(["ability", ""], rows)
 
 

@@ -19,8 +19,9 @@ from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
 from tpm_design.mechanisms import mechanism_kind
 from tpm_design.problem import Design, evaluate, with_ties
-from tpm_design.report.words import pose_text, pose_unit_names
+from tpm_design.report.words import gap_text, pose_text, pose_unit_names
 from tpm_design.runs.folder import STUDY, newest_run, read_run
+from tpm_design.runs.optimality import gap_of
 from tpm_design.runs.optimize import check_plan
 from tpm_design.runs.search import best_entry
 from tpm_design.study import (
@@ -296,6 +297,9 @@ def _run_data(study: Study, run: Run) -> dict[str, Any]:
     data: dict[str, Any] = {"study": study.name, "run": str(run.folder), "status": run.status}
     if run.best is not None:
         data["best"] = evaluation_data(study.problem, study.units, run.best)
+    if run.result.bound is not None and run.result.bound.reachable:
+        least = study.units.from_si(run.result.bound.least, "m")
+        data["bound"] = {"value": least, "unit": study.units.name("m"), "gap": gap_of(run.result)}
     if run.verdict is not None:
         data["verdict"] = verdict_data(study, run.verdict)
     return data
@@ -318,8 +322,15 @@ def _run_text(study: Study, run: Run) -> str:
         after.append(f"Next: tpm-design optimize {run.folder / STUDY} --resume {run.folder}{allow}")
     else:
         after.append(f"Next: tpm-design report {run.folder}{allow}")
-    lines = [run.status, *run.result.remarks, *after]
+    lines = [run.status, *_gap_lines(study, run), *run.result.remarks, *after]
     return "\n\n".join([*parts, "\n".join(lines)])
+
+
+def _gap_lines(study: Study, run: Run) -> list[str]:
+    bound = run.result.bound
+    if bound is None or not bound.reachable:
+        return []
+    return [gap_text(bound.goal, study.units.written(bound.least, "m"), gap_of(run.result))]
 
 
 def _ending(run: Run) -> int | None:

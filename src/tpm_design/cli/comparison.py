@@ -12,7 +12,8 @@ from tpm_design.cli.results import NO_VALUE, error_text
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
 from tpm_design.problem import Goal
-from tpm_design.report.words import asked
+from tpm_design.report.words import asked, gap_percent
+from tpm_design.runs.optimality import gap_of
 from tpm_design.runs.tables import csv_line, goal_unit, metric_columns, number
 from tpm_design.study import Study
 from tpm_design.study.actions import Run
@@ -52,6 +53,10 @@ def comparison_text(studies: Mapping[str, Study], runs: Mapping[str, Run]) -> st
         wanted = asked(goal, first.units, goal_unit(first.problem, goal))
         title = label if wanted in ("", "recorded") else f"{label} ({wanted})"
         rows.append([title, *(_metric(studies[key], run, label) for key, run in runs.items())])
+    gaps = [gap_of(run.result) for run in runs.values()]
+    if any(gap is not None for gap in gaps):
+        shown = [NO_VALUE if gap is None else f"at most {gap_percent(gap)} %" for gap in gaps]
+        rows.append(["above the optimum", *shown])
     rows.append(["design", *(_standing(run) for run in runs.values())])
     folders = "\n".join(f"{label}: {run.folder}" for label, run in runs.items())
     return f"{table(['', *runs], rows)}\n\n{folders}"

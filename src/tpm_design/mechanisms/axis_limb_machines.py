@@ -24,6 +24,7 @@ from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField,
 from tpm_design.mechanisms.cylinders import reach_of_cylinders
 from tpm_design.mechanisms.fold_lines import FoldLine, Vector
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.mechanisms.outer_reach import OuterReach, ReachCone, Values, axis_limb_cones
 from tpm_design.mechanisms.parameters import enclosed_values, three_numbers
 
 # determinants and sines of directions below it count as zero
@@ -260,6 +261,21 @@ def farthest_reach_of(
     # a cylinder about an axis elsewhere is within a wider one about the parallel through the origin
     return reach_of_cylinders([(0.0, 0.0, 0.0)] * 3, axes, radii)
 
+
+def reach_cones_of(
+    values: Values, limits: Mapping[str, Any], *, slides: bool = False
+) -> tuple[ReachCone, ...]:
+    """ρ_i ≤ f_i + r_i, and the ends of the strokes; ``slides`` as for ``limb_directions``."""
+    directions = limb_directions(values, slides=slides)
+    forms = list(zip(directions.first_form, directions.second_form, strict=True))
+    strokes = [
+        [side / advance for side in axis]
+        for axis, advance in zip(directions.axis, directions.advance, strict=True)
+    ]
+    return axis_limb_cones(forms, strokes, limits)
+
+
+OUTER_REACH = OuterReach(reach_cones_of, ("azimuth", "elevation"))
 
 NOWHERE = (0.0, 0.0, 0.0)
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
+from tpm_design.mechanisms.outer_reach import OuterReach
+
 if TYPE_CHECKING:
     from tpm_design.mechanisms.mechanism import Mechanism
 
@@ -110,6 +112,7 @@ class MechanismKind:
     tolerances, None where it can. ``remarks``: what a user should know besides, one sentence or two each.
     ``mode_candidates(ranges, isotropic)``: sign strings of one working mode of each set that symmetry
     makes equal for every design of the ranges; None: all modes count as different.
+    ``outer_reach``: the convex bounds of its reach, None where it declares none.
     """
 
     name: str
@@ -136,6 +139,7 @@ class MechanismKind:
     coordinates: tuple[str, ...] = ("x", "y", "z")
     coordinate_units: tuple[str, ...] = ("m", "m", "m")
     tolerance_refusal: str | None = None
+    outer_reach: OuterReach | None = None
 
     @property
     def translational(self) -> bool:

@@ -16,6 +16,7 @@ from tpm_design.mechanisms.axis_limb_machines import (
     DRAWING,
     LIMITS,
     MODE_FIELDS,
+    OUTER_REACH,
     PARAMETERS,
     SINGULARITIES,
     AxisLimbMechanism,
@@ -57,6 +58,7 @@ KIND = MechanismKind(
     example=MappingProxyType({"f": 0.2, "r": 0.2}),
     build=build,
     farthest_reach=farthest_reach,
+    outer_reach=OUTER_REACH,
     limb_rotation=NEXT_AXIS,
     drawing=DRAWING,
 )

@@ -22,6 +22,7 @@ from tpm_design.mechanisms.axis_limb_machines import (
     DRAWING,
     LIMITS,
     MODE_FIELDS,
+    OUTER_REACH,
     PARAMETERS,
     PLANE,
     SINGULARITIES,
@@ -173,6 +174,7 @@ KIND = MechanismKind(
     example=MappingProxyType({"f": 0.2, "r": 0.2}),
     build=build,
     farthest_reach=farthest_reach,
+    outer_reach=OUTER_REACH,
     limb_rotation=NEXT_AXIS,
     drawing=DRAWING,
 )  # fmt: skip

@@ -23,6 +23,7 @@ from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.joint_limits import JointRange, enclosed_range, joint_range, range_numbers
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.mechanisms.outer_reach import Affine, OuterReach, ReachCone, Values, swing_share
 from tpm_design.mechanisms.parallelograms import rotation_determinant
 from tpm_design.mechanisms.parameters import enclosed_values, limb_values, span, swing_limit, three_numbers
 from tpm_design.mechanisms.spheres import sphere_intersection
@@ -315,6 +316,23 @@ def farthest_reach(ranges: Mapping[str, tuple[float, float]]) -> float:
     return offset + span(ranges, "L")[1] + span(ranges, "l")[1]
 
 
+def reach_cones(values: Values, limits: Mapping[str, Any]) -> tuple[ReachCone, ...]:
+    """|p − (w_i − u_i) ε_i| ≤ L_i + l_i, both arms in line, and |τ_i · p| ≤ l_i, times the sine of the swing:
+    the lower arm alone leaves the plane of the upper arm's motion."""
+    outward, hinge = directions([cosine_sine(angle) for angle in values["azimuth"]], 0.0)
+    cones = []
+    for limb in range(3):
+        (ex, ey, _), (tx, ty, _) = outward[limb], hinge[limb]
+        along = Affine({("w", limb): -1.0, ("u", limb): 1.0}, (ex, ey, 0.0))
+        aside = Affine({}, (tx, ty, 0.0))
+        sides = (along, Affine({}, (0.0, 0.0, -1.0)), aside)
+        cones += [
+            ReachCone(sides, Affine({("L", limb): 1.0, ("l", limb): 1.0})),
+            ReachCone((aside,), Affine({("l", limb): swing_share(limits)})),
+        ]
+    return tuple(cones)
+
+
 KIND = MechanismKind(
     name="delta",
     title="DELTA",
@@ -346,6 +364,7 @@ KIND = MechanismKind(
     example=MappingProxyType({"w": 0.164, "u": 0.044, "L": 0.524, "l": 1.244}),
     build=build,
     farthest_reach=farthest_reach,
+    outer_reach=OuterReach(reach_cones, ("azimuth",)),
     limb_rotation=THIRD_TURN,
     drawing=Drawing(
         joints=("A", "C", "B"),

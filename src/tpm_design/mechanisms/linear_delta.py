@@ -23,6 +23,7 @@ from tpm_design.mechanisms.angles import THIRD_TURN, cosine_sine, enclosed_cosin
 from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.mechanisms.outer_reach import Affine, OuterReach, ReachCone, Values, swing_share
 from tpm_design.mechanisms.parallelograms import rotation_determinant
 from tpm_design.mechanisms.parameters import enclosed_values, limb_values, span, swing_limit
 from tpm_design.mechanisms.rails import (
@@ -223,6 +224,27 @@ def farthest_reach(ranges: Mapping[str, tuple[float, float]]) -> float:
     return offset + span(ranges, "l")[1] + span(ranges, "rail")[1]
 
 
+def reach_cones(values: Values, limits: Mapping[str, Any]) -> tuple[ReachCone, ...]:
+    """|w_i × u_i| ≤ l_i with w_i = p − (R_i − r_i) ε_i, and |τ_i · p| ≤ l_i times the sine of the swing."""
+    outward, rail, hinge = directions(
+        [cosine_sine(angle) for angle in values["azimuth"]],
+        [cosine_sine(angle) for angle in values["tilt"]],
+        0.0,
+    )
+    cones = []
+    for limb in range(3):
+        (tx, ty, _), (ux, uy, uz), (ex, ey, _) = hinge[limb], rail[limb], outward[limb]
+        aside = Affine({}, (tx, ty, 0.0))
+        # square to rail and hinge: the rail leans in the plane of ε_i and z
+        sx, sy, sz = ty * uz, -tx * uz, tx * uy - ty * ux
+        share = -(sx * ex + sy * ey)
+        out = Affine({("R", limb): share, ("r", limb): -share}, (sx, sy, sz))
+        cones.append(ReachCone((aside, out), Affine({("l", limb): 1.0})))
+        if "swing" in limits:
+            cones.append(ReachCone((aside,), Affine({("l", limb): swing_share(limits)})))
+    return tuple(cones)
+
+
 KIND = MechanismKind(
     name="linear_delta",
     title="linear DELTA",
@@ -259,6 +281,7 @@ KIND = MechanismKind(
     example=MappingProxyType({"R": 0.142, "r": 0.073, "l": 0.264, "rail": 0.4}),
     build=build,
     farthest_reach=farthest_reach,
+    outer_reach=OuterReach(reach_cones, ("azimuth", "tilt")),
     limb_rotation=THIRD_TURN,
     drawing=Drawing(
         joints=("A", "C", "B"),

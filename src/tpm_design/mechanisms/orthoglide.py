@@ -24,6 +24,7 @@ from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.cylinders import reach_of_cylinders
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.mechanisms.outer_reach import Affine, OuterReach, ReachCone, Values, swing_share
 from tpm_design.mechanisms.parameters import enclosed_values, limb_values, span, swing_limit
 from tpm_design.mechanisms.rails import (
     CarriageSigns,
@@ -173,6 +174,17 @@ def farthest_reach(ranges: Mapping[str, tuple[float, float]]) -> float:
     return math.sqrt(1.5) * span(ranges, "L")[1]
 
 
+def reach_cones(values: Values, limits: Mapping[str, Any]) -> tuple[ReachCone, ...]:
+    """A strut square to its rail reaches farthest; at a limit of its angle with the rail, the sine of it."""
+    return tuple(
+        ReachCone(
+            tuple(Affine({}, axis) for number, axis in enumerate(AXES) if number != limb),
+            Affine({("L", limb): swing_share(limits)}),
+        )
+        for limb in range(3)
+    )
+
+
 KIND = MechanismKind(
     name="orthoglide",
     title="Orthoglide",
@@ -204,6 +216,7 @@ KIND = MechanismKind(
     example=MappingProxyType({"L": 0.31, "d": 0.05}),
     build=build,
     farthest_reach=farthest_reach,
+    outer_reach=OuterReach(reach_cones),
     limb_rotation=NEXT_AXIS,
     drawing=Drawing(
         joints=("A", "B"),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -27,9 +28,11 @@ from tpm_design.mechanisms.axis_limb_machines import (
     limb_directions,
     limb_geometry,
     reach_bound,
+    reach_cones_of,
     slide_advance,
 )
 from tpm_design.mechanisms.base import MechanismKind, Parameter
+from tpm_design.mechanisms.outer_reach import OuterReach
 from tpm_design.mechanisms.parameters import limb_values
 
 
@@ -90,6 +93,9 @@ KIND = MechanismKind(
     example=MappingProxyType({"f": 0.2, "r": 0.2}),
     build=build,
     farthest_reach=farthest_reach,
+    outer_reach=OuterReach(
+        partial(reach_cones_of, slides=True), ("azimuth", "elevation", "slide_azimuth", "slide_elevation")
+    ),
     limb_rotation=NEXT_AXIS,
     drawing=DRAWING,
 )  # fmt: skip

@@ -40,6 +40,7 @@ from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.joint_limits import enclosed_range, joint_range, range_numbers
 from tpm_design.mechanisms.mechanism import FloatArray, Mechanism, Mode
+from tpm_design.mechanisms.outer_reach import Affine, OuterReach, Ranges, ReachCone, Values
 from tpm_design.mechanisms.parameters import enclosed_values, limb_values, span, three_numbers
 from tpm_design.mechanisms.symmetry import IDENTITY, SignedPermutation, mode_orbits, symmetries
 from tpm_design.mechanisms.two_link import distal_link
@@ -607,6 +608,42 @@ def _random_symmetries(
     return symmetries(build(values, {}).geometry)
 
 
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def reach_cones(values: Values, limits: Mapping[str, Any]) -> tuple[ReachCone, ...]:
+    """ρ_i ≤ f_i + r_i (29)."""
+    cones = []
+    for limb in range(3):
+        sides = [Affine({}, axis) for axis in AXES]
+        sides[limb] = Affine({("dp", limb): 1.0, ("db", limb): -1.0}, AXES[limb])
+        cones.append(ReachCone(tuple(sides), Affine({("f", limb): 1.0, ("r", limb): 1.0})))
+    return tuple(cones)
+
+
+def planes_are_singular(
+    ranges: Ranges, limits: Mapping[str, Any], edges: Sequence[float], distance: float
+) -> bool:
+    """Whether the planes within ``distance`` of a box are seen by its distance to det H = 0, which counts
+    poses within closed reach alone.
+
+    Let the box begin at x = m < distance, its face there [y, y + 2s] × [z, z + 2t], and move the face's
+    middle to x = 0. ρ_1² changes by |m² + 2 δ_1 m|; from the middle to the face's nearest and farthest corner
+    it changes by s² + t² or more. ρ_2² and ρ_3² fall by m²; from the middle to the face's nearest edge they
+    fall by t² and s² or more. So where these are no less, each ρ_i lies between values that it has in the
+    box, and all limbs reach the point. Limits of joints might still rule it out.
+    """
+    if any(name.startswith("theta") for name in limits):
+        return False
+    for limb in range(3):
+        (lowest, highest), (nearest, farthest) = ranges[("dp", limb)], ranges[("db", limb)]
+        offset = max(abs(highest - nearest), abs(farthest - lowest))
+        s, t = 0.5 * edges[(limb + 1) % 3], 0.5 * edges[(limb + 2) % 3]
+        if distance**2 + 2.0 * offset * distance > s * s + t * t or distance > min(s, t):
+            return False
+    return True
+
+
 KIND = MechanismKind(
     name="uru",
     title="LaMaViP 3-URU",
@@ -649,6 +686,7 @@ KIND = MechanismKind(
     example=MappingProxyType({"db": 0.1, "dp": 0.06, "f": 0.25, "r": 0.25, "k": 1.0}),
     build=build,
     farthest_reach=farthest_reach,
+    outer_reach=OuterReach(reach_cones, planes_are_singular=planes_are_singular),
     mode_candidates=mode_candidates,
     drawing=Drawing(
         joints=("A", "C", "B"),

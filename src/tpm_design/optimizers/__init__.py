@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from tpm_design.errors import RefusedError, UsageError, did_you_mean
-from tpm_design.optimizers import nlopt, scipy
+from tpm_design.optimizers import convex, nlopt, scipy
 from tpm_design.optimizers.base import Optimizer
 from tpm_design.optimizers.refusal import refusal
 
 OPTIMIZERS: Mapping[str, Optimizer] = MappingProxyType(
-    {method.name: method for method in (*scipy.METHODS, *nlopt.METHODS)}
+    {method.name: method for method in (*scipy.METHODS, *nlopt.METHODS, *convex.METHODS)}
 )
 
 
@@ -35,7 +35,9 @@ def check_pair(
     able = [
         other
         for other in OPTIMIZERS.values()
-        if refusal(other, dimension=dimension, discrete=discrete, nondifferentiable=nondifferentiable) is None
+        if not other.abilities.relaxation
+        and refusal(other, dimension=dimension, discrete=discrete, nondifferentiable=nondifferentiable)
+        is None
     ]
     alike = [other for other in able if other.abilities.whole_space == method.abilities.whole_space]
     raise RefusedError(

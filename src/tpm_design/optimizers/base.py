@@ -60,6 +60,7 @@ class Abilities:
     may be given variables with levels. ``derivatives``: it follows gradients, so every metric must be
     differentiable. ``random``: its path depends on the seed. ``whole_space``: global, as opposed to
     local from ``start``. ``batch``: it evaluates whole populations at once, so workers help.
+    ``relaxation``: it solves a convex relaxation of the problem, which must have one.
     """
 
     constraints: bool
@@ -70,6 +71,7 @@ class Abilities:
     batch: bool
     smallest_dimension: int = 1
     largest_dimension: int | None = None
+    relaxation: bool = False
 
 
 @dataclass(frozen=True)

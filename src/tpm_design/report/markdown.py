@@ -14,7 +14,15 @@ from tpm_design.report.figures import DRAWING, FIGURES, Picture
 from tpm_design.report.readings import AT_BOUND, at_end, limiting, nearest_constraint, readings
 from tpm_design.report.reported import Reported
 from tpm_design.report.swept import sweep_lines
-from tpm_design.report.words import MOST_LISTED, asked, centre_text, options_text, range_text, shape_text
+from tpm_design.report.words import (
+    MOST_LISTED,
+    asked,
+    centre_text,
+    gap_text,
+    options_text,
+    range_text,
+    shape_text,
+)
 from tpm_design.runs.folder import DESIGNS, LOG, STUDY, SUMMARY, TABLE
 from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import goal_unit, parameter_columns
@@ -41,6 +49,7 @@ def report_markdown(reported: Reported, pictures: Sequence[Picture]) -> str:
         _metrics(reported),
         certificate_lines(reported),
         [] if reported.swept else _limits(reported),
+        [] if reported.swept else _optimality(reported),
         _evaluated(reported) if reported.swept else _search(reported),
         _figures("Figures", [picture for picture in pictures if picture.file != DRAWING]),
         _caveats(reported),
@@ -216,6 +225,22 @@ def _limits(reported: Reported) -> list[str]:
             "A larger budget may find a better design."
         )
     return lines
+
+
+def _optimality(reported: Reported) -> list[str]:
+    bound = reported.run.summary.get("bound")
+    if not isinstance(bound, dict) or not isinstance(bound.get("least"), float):
+        return []
+    least, gap = reported.study.units.written(bound["least"], "m"), bound.get("gap")
+    words = gap_text(str(bound.get("objective")), least, gap if isinstance(gap, float) else None)
+    return [
+        "## How far from the optimum",
+        "",
+        text(words),
+        "",
+        "The bound is the optimum of a convex relaxation: outer reach over the whole region, octant, ranges "
+        "and ties; inner reach, elbows, singularities and other constraints can only lengthen the links.",
+    ]
 
 
 def _missing(reported: Reported, evaluation: Evaluation) -> Iterable[str]:

@@ -24,6 +24,22 @@ def asked(goal: Goal, units: Units, unit: str) -> str:
     return " and ".join(bounds) or "recorded"
 
 
+def gap_percent(gap: float) -> str:
+    """A share above a bound, in percent; never told to be less than a thousandth."""
+    return f"{max(100.0 * gap, 0.001):.3g}"
+
+
+def gap_text(goal: str, least: str, gap: float | None) -> str:
+    """What a lower bound on the objective says of the best design; ``gap``: by which share it is above, None
+    without a feasible one."""
+    if gap is None:
+        return f"No design that reaches the region has a {goal} below {least}, whatever else is asked of it."
+    return (
+        f"Optimality gap: at most {gap_percent(gap)} % above the shortest links that reach the region at all "
+        f"({goal} of at least {least})."
+    )
+
+
 def options_text(goal: Goal, units: Units) -> str:
     """The metric's options in force: ``norm 2, drive motor``; empty where it has none."""
     parts = []

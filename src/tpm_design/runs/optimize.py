@@ -15,6 +15,8 @@ from tpm_design.optimizers.base import BudgetSpent, Optimizer, Stalled
 from tpm_design.problem import Goal, Problem, Sample
 from tpm_design.runs.replay import answers_in, left_over
 from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch, best_entry
+from tpm_design.synthesis.bound import ReachBound
+from tpm_design.synthesis.relaxation import checked_relaxation
 
 POLISH_SHARE = 0.25
 """Part of the budget kept for polishing. The whole-space search does not know it: a larger budget lets the
@@ -66,7 +68,8 @@ class SearchResult:
     "stalled" (the method could not go on), "interrupted" or, of a search that certifies, "proved" or
     "not provable" (no round could help).
     ``status``: one or more sentences with what to do where the result is not what was hoped for.
-    ``rounds`` and ``verdict`` (on ``best``): of a search that certifies, as far as it came."""
+    ``rounds`` and ``verdict`` (on ``best``): of a search that certifies, as far as it came. ``bound``: on the
+    objective, where the problem has a convex relaxation."""
 
     entries: tuple[Entry, ...]
     best: Entry | None
@@ -75,6 +78,7 @@ class SearchResult:
     remarks: tuple[str, ...]
     rounds: tuple[Round, ...] = ()
     verdict: Verdict | None = None
+    bound: ReachBound | None = None
 
 
 def check_plan(problem: Problem, plan: SearchPlan) -> None:
@@ -93,6 +97,8 @@ def check_plan(problem: Problem, plan: SearchPlan) -> None:
     discrete = [variable.name for variable in problem.variables if variable.values]
     method = optimizer(plan.method)
     check_pair(method, dimension=len(problem.variables), discrete=discrete, nondifferentiable=rough)
+    if method.abilities.relaxation:
+        checked_relaxation(problem)
     if plan.polish is not None:
         polish = optimizer(plan.polish)
         if polish.abilities.whole_space:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tpm_design.design_space import DesignSpace
 from tpm_design.optimizers.base import BudgetSpent, Outcomes
 from tpm_design.problem import Design, Evaluation, Goal, Problem, Sample, evaluate
+from tpm_design.synthesis.bound import relaxed_designs
 
 FloatArray = NDArray[np.float64]
 Key = tuple[float | str, ...]
@@ -143,6 +144,14 @@ class UnitSearch:
         table = np.atleast_2d(np.asarray(points, dtype=np.float64))
         results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
         return outcomes(self.log.problem, results, self.sizes)
+
+    def relaxed_optima(self) -> FloatArray:
+        """Points (N, n) of the convex relaxation's designs, see ``synthesis``. Raises RefusedError where the
+        solver fails."""
+        # one more than can be evaluated: so what is left out ends as a spent budget
+        designs = relaxed_designs(self.log.problem, self.space.design(self.start), self.limit + 1)
+        points = [self.space.point(design) for design in designs]
+        return np.array(points, dtype=np.float64).reshape(-1, self.dimension)
 
     def continuous_near(self, entry: Entry, share: float, limit: int) -> UnitSearch:
         """The search of the continuous variables alone, within ``share`` of their ranges around a design

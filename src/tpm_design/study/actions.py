@@ -17,6 +17,7 @@ from tpm_design.errors import UsageError, did_you_mean
 from tpm_design.problem import Design, Evaluation, evaluate, with_ties
 from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run, text_hash
 from tpm_design.runs.lock import sole_writer
+from tpm_design.runs.optimality import gap_of, with_bound
 from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, search
 from tpm_design.runs.rounds import Proving, search_certified
 from tpm_design.runs.search import Entry
@@ -104,9 +105,11 @@ def _searched(
     study: Study, plan: SearchPlan, workers: int, record: Callable[[Entry], None], stored: Sequence[Entry]
 ) -> SearchResult:
     if study.certification is None:
-        return search(study.problem, plan, workers=workers, record=record, stored=stored)
-    proving = Proving(study.certification.tolerance, study.certification.boxes)
-    return search_certified(study.problem, plan, proving, workers=workers, record=record, stored=stored)
+        result = search(study.problem, plan, workers=workers, record=record, stored=stored)
+    else:
+        proving = Proving(study.certification.tolerance, study.certification.boxes)
+        result = search_certified(study.problem, plan, proving, workers=workers, record=record, stored=stored)
+    return with_bound(study.problem, plan, result)
 
 
 def _written(
@@ -144,6 +147,7 @@ def _written(
             "budget": plan.budget,
             "workers": workers,
             "remarks": list(result.remarks),
+            **_bound_data(result),
             **({} if study.certification is None else _rounds_data(result)),
             "study_hash": study.study_hash,
             "study_file_hash": text_hash(study_text),
@@ -153,6 +157,15 @@ def _written(
         }
         writer.finish(result.entries, [result.best] if result.best else [], summary)
     return result
+
+
+def _bound_data(result: SearchResult) -> dict[str, Any]:
+    """For run.json: the lower bound on the objective (SI; null: nothing reaches the region), and by which
+    share the best design is above it."""
+    if result.bound is None:
+        return {}
+    least = result.bound.least if result.bound.reachable else None
+    return {"bound": {"objective": result.bound.goal, "least": least, "gap": gap_of(result)}}
 
 
 def _rounds_data(result: SearchResult) -> dict[str, Any]:
