@@ -197,7 +197,7 @@ def test_too_few_boxes_leave_the_design_not_proved(tmp_path: Path) -> None:
     assert run.verdict is not None
     assert run.verdict.outcome == "undecided"
     assert (
-        "Not proved for every machine within the tolerances: even (frobenius: 20 boxes were not enough)."
+        "Not proved for every machine within the tolerances: even (1/κ_F: 20 boxes were not enough)."
         in run.status
     )
     assert "allow more boxes" in run.status
