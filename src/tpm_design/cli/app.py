@@ -12,7 +12,10 @@ from tpm_design.cli.guard import guarded, run_to_the_end
 app = typer.Typer(
     name="tpm-design",
     help="Dimensions for translational parallel robots: reachable, well conditioned, far from singularities.",
-    epilog="Start with `tpm-design init`, then `tpm-design optimize study.yaml` and `tpm-design report`.",
+    epilog="Start with `tpm-design init`, then `tpm-design optimize study.yaml` and `tpm-design report`. "
+    "Exit codes: 0 done, 1 internal error, 2 wrong usage or invalid study, 3 no feasible design, 4 outside "
+    "tolerance of a baseline or of stored results, 5 requirement refuted or not proved, 6 points of a sweep "
+    "failed, 130 interrupted: --resume goes on.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -44,12 +47,7 @@ def options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
-    """Dimensions for translational parallel robots: reachable, well conditioned, far from singularities.
-
-    Exit codes: 0 done, 1 internal error, 2 wrong usage or invalid study, 3 no feasible design, 4 outside
-    tolerance of a baseline or of stored results, 5 requirement refuted or not proved, 6 points of a sweep
-    failed, 130 interrupted: --resume goes on.
-    """
+    """Options of the program itself."""
 
 
 @app.command()
