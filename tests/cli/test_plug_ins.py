@@ -22,7 +22,7 @@ from tpm_design.arithmetic.compilation import follow_plug_ins
 from tpm_design.arithmetic.kernel_cache import PLUG_IN
 from tpm_design.errors import PlugInError, StudyError
 from tpm_design.mechanisms.plug_in import load_kind
-from tpm_design.study import study_schema
+from tpm_design.study import load_comparison, study_schema
 from tpm_design.study.document import read_document
 
 GANTRY = (Path(__file__).parents[1] / "plug_ins" / "gantry.py").read_text(encoding="utf-8")
@@ -171,6 +171,20 @@ def test_python_asks_too(tmp_path: Path) -> None:
 
 
 # ------------------------------------------------------------------------------ as good as built in
+
+
+def test_architectures_of_a_comparison_may_be_plug_ins_too(tmp_path: Path) -> None:
+    study = written(tmp_path) / "study.yaml"
+    part = "{mechanism: {file: gantry.py, parameters: {o: 0, h: {min: 90, max: 300}, k: 2}}}"
+    lines = study.read_text(encoding="utf-8").splitlines()
+    start = lines.index("mechanism:")
+    lines[start : start + 3] = ["architectures:", f"  one: {part}", f"  two: {part}"]
+    study.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with pytest.raises(StudyError, match="the mechanism is a Python file"):
+        load_comparison(study)
+    comparison = load_comparison(study, allow_code=True)
+    assert comparison is not None
+    assert [one.problem.kind.name for one in comparison.studies.values()] == ["gantry", "gantry"]
 
 
 def test_a_search_finds_the_shortest_strokes(run_folder: Path) -> None:

@@ -22,6 +22,9 @@ from pydantic_core import PydanticCustomError
 LARGEST = 1e15
 SMALLEST = 1e-15
 LARGEST_GRID = 1_000_000
+ARCHITECTURES = "architectures"
+"""The key by which a file asks several mechanisms the same."""
+
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
 PYTHON_FILE = r"^[^/\\].*\.py$"
 NAME_REMEDY = "Use 1 to 64 letters, digits, '.', '_' or '-', a letter or digit first: it names a folder."

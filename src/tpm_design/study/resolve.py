@@ -15,6 +15,7 @@ from tpm_design.study.faults import Faults, shown
 from tpm_design.study.form import parse
 from tpm_design.study.goals import GoalReader
 from tpm_design.study.model import (
+    ARCHITECTURES,
     BoxModel,
     Center,
     CertifyModel,
@@ -49,9 +50,9 @@ def load_study(path: str | Path, *, allow_code: bool = False) -> Study:
     refused; what is wrong in the file itself is a PlugInError.
     """
     document = read_document(Path(path))
-    if "architectures" in document.data:
+    if ARCHITECTURES in document.data:
         Faults(document).stop(
-            ("architectures",),
+            (ARCHITECTURES,),
             "this file compares several architectures",
             "Use it with optimize or validate; a run of one of them is a study for the other commands.",
         )

@@ -8,9 +8,8 @@ from typing import Any
 
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.metrics.base import Metric, Option
-from tpm_design.study.comparison import KEY as ARCHITECTURES
 from tpm_design.study.comparison import SHARED_ONLY
-from tpm_design.study.model import NAME, PYTHON_FILE, StudyModel
+from tpm_design.study.model import ARCHITECTURES, NAME, PYTHON_FILE, StudyModel
 from tpm_design.study.registries import Registries, registries
 
 Schema = dict[str, Any]
@@ -56,7 +55,7 @@ def _architectures(schema: Schema) -> None:
         "description": "in a comparison: label → what this architecture does not share with the others",
         "type": "object",
         "minProperties": 2,
-        "propertyNames": {"pattern": f"^{NAME}$"},
+        "propertyNames": {"pattern": NAME},
         "additionalProperties": part,
     }
 
