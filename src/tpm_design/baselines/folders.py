@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from tpm_design.errors import UsageError
-from tpm_design.runs.folder import DESIGNS, LOG, STUDY, SUMMARY, TABLE, read_summary
+from tpm_design.runs.folder import DESIGNS, LOG, STUDY, SUMMARY, TABLE, UNFINISHED, read_summary
 from tpm_design.study.document import read_document
 from tpm_design.study.plain import flow_yaml
 
 LONGEST_VALUE = 60
 MOST_DIFFERENCES = 4
 
-UNFINISHED = {"interrupted", "unfinished"}
+NOT_ENDED = {"interrupted", UNFINISHED}
 """Endings in run.json of runs that have no result yet."""
 
 NOT_ASKED = {"optimizer", "mechanism.sha256"}
@@ -57,7 +57,7 @@ def read_result(folder: Path) -> Result:
             remedy=f"A run or a baseline holds {STUDY}, {SUMMARY} and {DESIGNS} or {TABLE}.",
         )
     summary = read_summary(folder)
-    if not summary or summary.get("ending") in UNFINISHED:
+    if not summary or summary.get("ending") in NOT_ENDED:
         raise UsageError(
             "This run did not come to its end.",
             where=str(folder / SUMMARY),

@@ -120,7 +120,7 @@ def demands(goal: Goal, kind: MechanismKind, signs: Sequence[float]) -> tuple[De
         Demand("determinant", 0.0, name=determinant, sign=sign)
         for determinant, sign in zip(kind.determinants, signs, strict=True)
     ]
-    driving = [side for side in sides if side.name == ("actuation" if drive == "motor" else "translation")]
+    driving = [side for side in sides if side.name == kind.guard(drive)]
     if name == "coverage":
         return (REACH, *sides)
     if name == "conditioning_min" and goal.options.get("over", "region") == "region":

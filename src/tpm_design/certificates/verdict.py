@@ -11,6 +11,7 @@ from tpm_design.arithmetic.rounding import check_rounding
 from tpm_design.certificates.demands import REACH, Demand, NoProofError, demands, refutable
 from tpm_design.certificates.settlement import Breaking, Outcome, Settlement, settle
 from tpm_design.errors import ParameterError
+from tpm_design.mechanisms.base import within
 from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.metrics.context import Context
@@ -79,7 +80,7 @@ def verdict(
     distinct = list(dict.fromkeys(demand for need in needs if not isinstance(need, str) for demand in need))
     if context.region is not None and distinct:
         # what the threads share is computed before they start
-        _ = context.poses, context.lattice_determinants
+        _ = context.poses, context.lattice_sides
     with ThreadPoolExecutor(max_workers=max(1, workers)) as pool:
         settlements = tuple(
             pool.map(
@@ -108,16 +109,10 @@ def check_tolerances(mechanism: Mechanism, tolerance: Mapping[str, float]) -> No
     for name, bounds in limb_tolerances(mechanism.kind, tolerance).items():
         parameter = mechanism.kind.parameter(name)
         for value, bound in zip(mechanism.parameters[name], bounds, strict=True):
-            outside = {
-                "positive": bound >= abs(value),
-                "non-zero": bound >= abs(value),
-                "non-negative": bound > abs(value),
-                "any": False,
-            }[parameter.domain if parameter else "any"]
-            if bound > 0.0 and outside:
+            if parameter and bound > 0.0 and not within(parameter.domain, value - bound, value + bound):
                 raise ParameterError(
                     f"The tolerance of {name}, {bound:g} m, is not smaller than {name} itself, {value:g} m."
-                    if parameter and parameter.dimension == "length"
+                    if parameter.dimension == "length"
                     else f"The tolerance of {name}, {bound:g}, is not smaller than {name} itself, {value:g}.",
                     remedy="Tolerances are ± and in the study's units, as its parameters are.",
                 )
@@ -135,18 +130,11 @@ def _needs(goal: Goal, context: Context) -> tuple[Demand, ...] | str:
     placed = context.region
     if goal.metric.name == "coverage" and placed is not None and len(placed.points) > 1:
         return "that separate poses lie in one aspect has no proof here"
-    signs = [1.0] * len(kind.determinants)
-    if context.region is not None:
-        signs = [1.0 if low + high >= 0.0 else -1.0 for low, high in _ranges(context)]
+    signs = (1.0,) * len(kind.determinants) if context.region is None else context.lattice_sides
     try:
         return demands(goal, kind, signs)
     except NoProofError as reason:
         return str(reason)
-
-
-def _ranges(context: Context) -> list[tuple[float, float]]:
-    """Least and greatest value of each determinant on the region's lattice."""
-    return [(float(values.min()), float(values.max())) for values in context.lattice_determinants]
 
 
 def _requirement(goal: Goal, numbers: list[int], settlements: tuple[Settlement, ...]) -> Requirement:

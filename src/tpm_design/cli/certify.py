@@ -16,18 +16,17 @@ from tpm_design.certificates.document import FILE, document, write_document
 from tpm_design.certificates.tolerances import LargestTolerance, largest_tolerance
 from tpm_design.certificates.verdict import Requirement, Verdict, verdict
 from tpm_design.checker import Progress, check_certificate
-from tpm_design.cli.commands import chosen_design, usable_processors
+from tpm_design.cli.commands import chosen_design, worker_threads
 from tpm_design.cli.guard import NOT_PROVED, complain
 from tpm_design.cli.progress import SECONDS_BETWEEN_LINES
 from tpm_design.cli.results import design_rows
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
 from tpm_design.problem import Design
-from tpm_design.report.words import asked, pose_text, pose_unit_names
-from tpm_design.runs.tables import goal_unit
+from tpm_design.report.words import asked, machines_text, pose_text, pose_unit_names, tolerances_text
+from tpm_design.runs.tables import goal_unit, parameter_unit
 from tpm_design.study import Study
 from tpm_design.study.study import Certification
-from tpm_design.units import si_unit
 
 NOTHING_ASKED = Certification({}, 400_000)
 
@@ -44,16 +43,13 @@ def certify_one(
     as_json: bool,
     quiet: bool,
 ) -> int | None:
-    if workers is not None and workers < 1:
-        raise UsageError(
-            f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
-        )
+    threads = worker_threads(workers)
     if check is not None:
         if path is not None or settings or max_tolerance or output is not None or allow_code:
             raise UsageError(
                 "--check stands alone.", where="certify", remedy="Write `tpm-design certify --check FILE`."
             )
-        return _check(check, workers or usable_processors(), as_json=as_json, quiet=quiet)
+        return _check(check, threads, as_json=as_json, quiet=quiet)
     if path is None:
         raise UsageError(
             "Nothing to certify.", where="certify", remedy="Name a study, a run folder, or --check FILE."
@@ -67,7 +63,6 @@ def certify_one(
         )
     if assumptions and not quiet and not as_json:
         print("Assumed: " + "; ".join(assumptions) + ".\n")
-    threads = workers or usable_processors()
     if max_tolerance:
         return _largest(study, design, threads, as_json=as_json, quiet=quiet)
     asked_for = study.certification or NOTHING_ASKED
@@ -109,29 +104,15 @@ def verdict_text(study: Study, found: Verdict) -> str:
 
 
 def _scope(study: Study, found: Verdict) -> str:
-    tolerances = tolerance_text(study, found)
     where = "at every pose of the region" if found.context.region is not None else "for the design"
-    if not tolerances:
-        return f"{where}, for the exact dimensions"
-    return f"{where}, for every machine within {tolerances} (each limb by itself, axis directions exact)"
+    return f"{where}, {machines_text(study.problem.kind, found.tolerance, study.units)}"
 
 
 def _culprit(study: Study, found: Verdict) -> str:
-    tolerances = tolerance_text(study, found)
+    tolerances = tolerances_text(study.problem.kind, found.tolerance, study.units)
     if not tolerances:
         return "the exact dimensions"
     return f"a machine within {tolerances} (each limb by itself, axis directions exact)"
-
-
-def tolerance_text(study: Study, found: Verdict, factor: float = 1.0) -> str:
-    """The tolerances in the study's units: ``f ± 0.1 mm, r ± 0.1 mm``; empty where there are none."""
-    parts = []
-    for name, bound in found.tolerance.items():
-        parameter = study.problem.kind.parameter(name)
-        unit = si_unit(parameter.dimension if parameter else "length")
-        if bound > 0.0:
-            parts.append(f"{name} ± {study.units.written(factor * bound, unit, digits=4)}")
-    return ", ".join(parts)
 
 
 def _user_pose(found: Verdict, coordinates: Sequence[float]) -> list[float]:
@@ -148,8 +129,7 @@ def _machine_text(study: Study, found: Verdict, parameters: Mapping[str, tuple[f
     """The dimensions in which a machine differs from the design: `` with f1 = 250.1 mm, …``."""
     parts = []
     for name, values in parameters.items():
-        parameter = study.problem.kind.parameter(name)
-        unit = si_unit(parameter.dimension if parameter else "length")
+        unit = parameter_unit(study.problem.kind, name)
         nominal = found.context.mechanism.parameters[name]
         for limb, (value, exact) in enumerate(zip(values, nominal, strict=True), start=1):
             if value != exact:
@@ -243,8 +223,7 @@ def _scaled(study: Study, asked_for: Certification, factor: float) -> dict[str, 
     """Tolerances times a factor: name → value and unit as the study writes them."""
     scaled = {}
     for name, bound in asked_for.tolerance.items():
-        parameter = study.problem.kind.parameter(name)
-        unit = si_unit(parameter.dimension if parameter else "length")
+        unit = parameter_unit(study.problem.kind, name)
         scaled[name] = (study.units.from_si(factor * bound, unit), study.units.name(unit))
     return scaled
 

@@ -14,7 +14,7 @@ from tpm_design.errors import UsageError
 from tpm_design.problem import Goal
 from tpm_design.report.words import asked, gap_percent
 from tpm_design.runs.optimality import gap_of
-from tpm_design.runs.tables import csv_line, goal_unit, metric_columns, number
+from tpm_design.runs.tables import csv_line, goal_unit, metric_columns, number, parameter_unit
 from tpm_design.study import Study
 from tpm_design.study.actions import Run
 
@@ -66,8 +66,7 @@ def _quantity(study: Study, run: Run, name: str) -> str:
     if run.best is None or name not in run.best.design:
         return ""
     value = run.best.design[name]
-    parameter = study.problem.kind.parameter(name)
-    unit = {"length": "m", "angle": "rad", "ratio": "-"}[parameter.dimension if parameter else "length"]
+    unit = parameter_unit(study.problem.kind, name)
     return value if isinstance(value, str) else study.units.written(value, unit)
 
 

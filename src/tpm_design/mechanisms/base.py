@@ -19,6 +19,17 @@ Rotation = tuple[tuple[float, float, float], ...]
 ModeCandidates = Callable[[Mapping[str, tuple[float, float]], bool], tuple[dict[str, str], ...]]
 
 
+def within(domain: Domain, low: float, high: float) -> bool:
+    """Whether every number from ``low`` to ``high`` is in the domain."""
+    if domain == "positive":
+        return low > 0
+    if domain == "non-negative":
+        return low >= 0
+    if domain == "non-zero":
+        return low > 0 or high < 0
+    return True
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One design parameter.
@@ -158,6 +169,10 @@ class MechanismKind:
         names = [f"center_{name}" for name in self.pose]
         x, y, z = (float(design[name]) if name in self.centre_names else 0.0 for name in names)
         return x, y, z
+
+    def guard(self, drive: str) -> str:
+        """The determinant whose zero takes control from the actuators of a drive."""
+        return "actuation" if drive == "motor" else "translation"
 
     def parameter(self, name: str) -> Parameter | None:
         """The parameter that ``name`` sets (``f`` or ``f2``), or None."""

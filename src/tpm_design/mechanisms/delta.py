@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 from numpy.typing import ArrayLike
 
 from tpm_design.arithmetic import Interval, cosine, formula, greater, magnitude, root, sine, sqr
-from tpm_design.arithmetic.algebra import determinant
 from tpm_design.arithmetic.lifting import replaced
 from tpm_design.mechanisms import equations, forward
 from tpm_design.mechanisms.angles import THIRD_TURN, cosine_sine, enclosed_cosine_sine
@@ -24,7 +23,12 @@ from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField,
 from tpm_design.mechanisms.joint_limits import JointRange, enclosed_range, joint_range, range_numbers
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.mechanisms.outer_reach import Affine, OuterReach, ReachCone, Values, swing_share
-from tpm_design.mechanisms.parallelograms import rotation_determinant
+from tpm_design.mechanisms.parallelograms import (
+    enclosed_swing_sine,
+    outward_and_hinge,
+    parallelogram_equations,
+    swing_sine,
+)
 from tpm_design.mechanisms.parameters import enclosed_values, limb_values, span, swing_limit, three_numbers
 from tpm_design.mechanisms.spheres import sphere_intersection
 from tpm_design.mechanisms.two_link import distal_link
@@ -32,7 +36,6 @@ from tpm_design.mechanisms.two_link import distal_link
 Triple = tuple[float, ...]
 
 AZIMUTHS = tuple(math.radians(angle) for angle in (-90.0, 30.0, 150.0))
-NO_LIMIT = 2.0
 SHORTEST = 1e-12
 
 
@@ -52,6 +55,9 @@ class DeltaGeometry(NamedTuple):
     range_bound: float
     swing_sine: float
     link_radius: float
+
+
+parallelogram_equations(DeltaGeometry)
 
 
 class DeltaSigns(NamedTuple):
@@ -151,16 +157,6 @@ def _mode_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     return turn1, swing1, turn2, swing2, turn3, swing3
 
 
-@formula(equations.singularity_margins, DeltaGeometry)
-def _singularity_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """det of the unit lower arms, det of the unit normals of the parallelograms."""
-    (a, b, c), _, _ = equations.unit_velocity_map(geometry, mode, 1.0, x, y, z)
-    return (
-        determinant(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]),
-        rotation_determinant((a, b, c), geometry.hinge),
-    )
-
-
 @formula(equations.serial_margins, DeltaGeometry)
 def _serial_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """|s_i · t_i|: 0 where the lower arm lies in the plane of upper arm and motor axis."""
@@ -222,11 +218,6 @@ def _with_limb_parameters(geometry, limb, values):  # type: ignore[no-untyped-de
     )
 
 
-def directions(azimuths: Sequence[Any], zero: Any) -> tuple[Any, Any]:
-    """ε_i and τ_i of all limbs from the cosines and sines of their azimuths."""
-    return tuple((c, s, zero) for c, s in azimuths), tuple((-s, c, zero) for c, s in azimuths)
-
-
 @dataclass(frozen=True)
 class Delta(Mechanism):
     """A DELTA with dimensions. Pose: (x, y, z) of the platform's point P, z upward."""
@@ -249,7 +240,7 @@ class Delta(Mechanism):
     def enclosed_geometry(self, tolerance: Mapping[str, float]) -> Any:
         held = enclosed_values(self.kind, self.parameters, tolerance)
         azimuths = [enclosed_cosine_sine(angle) for angle in self.parameters["azimuth"]]
-        outward, hinge = directions(azimuths, Interval(0.0, 0.0))
+        outward, hinge = outward_and_hinge(azimuths, Interval(0.0, 0.0))
         middle, across, bound = enclosed_range(self.arm_range)
         intervals: dict[str, Any] = {
             "base": held["w"],
@@ -261,9 +252,7 @@ class Delta(Mechanism):
             "range_cosine": middle,
             "range_sine": across,
             "range_bound": bound,
-            "swing_sine": Interval(NO_LIMIT, NO_LIMIT)
-            if self.swing is None
-            else sine(Interval(self.swing, self.swing)),
+            "swing_sine": enclosed_swing_sine(self.swing),
         }
         return self.geometry._replace(**intervals)
 
@@ -290,7 +279,7 @@ def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str
     """A DELTA from SI values: w, u, L, l (m), azimuth (rad), each one number or three; limits as declared.
     Raises ParameterError on dimensions that cannot be."""
     values = limb_values(KIND, parameters)
-    outward, hinge = directions([cosine_sine(angle) for angle in values["azimuth"]], 0.0)
+    outward, hinge = outward_and_hinge([cosine_sine(angle) for angle in values["azimuth"]], 0.0)
     arm_range, swing = joint_range(limits, "theta"), swing_limit(limits)
     middle, across, bound = range_numbers(arm_range)
     geometry = DeltaGeometry(
@@ -303,7 +292,7 @@ def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str
         range_cosine=middle,
         range_sine=across,
         range_bound=bound,
-        swing_sine=NO_LIMIT if swing is None else math.sin(swing),
+        swing_sine=swing_sine(swing),
         link_radius=float(limits.get("link_radius", 0.0)),
     )
     return Delta(kind=KIND, parameters=values, geometry=geometry, arm_range=arm_range, swing=swing)
@@ -319,7 +308,7 @@ def farthest_reach(ranges: Mapping[str, tuple[float, float]]) -> float:
 def reach_cones(values: Values, limits: Mapping[str, Any]) -> tuple[ReachCone, ...]:
     """|p − (w_i − u_i) ε_i| ≤ L_i + l_i, both arms in line, and |τ_i · p| ≤ l_i, times the sine of the swing:
     the lower arm alone leaves the plane of the upper arm's motion."""
-    outward, hinge = directions([cosine_sine(angle) for angle in values["azimuth"]], 0.0)
+    outward, hinge = outward_and_hinge([cosine_sine(angle) for angle in values["azimuth"]], 0.0)
     cones = []
     for limb in range(3):
         (ex, ey, _), (tx, ty, _) = outward[limb], hinge[limb]

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from tpm_design.arithmetic import Interval, formula, magnitude, root, sine, sqr
-from tpm_design.arithmetic.algebra import determinant
+from tpm_design.arithmetic import Interval, formula, magnitude, root, sqr
 from tpm_design.arithmetic.lifting import replaced
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.angles import THIRD_TURN, cosine_sine, enclosed_cosine_sine
@@ -24,7 +23,12 @@ from tpm_design.mechanisms.assembly import Assembly
 from tpm_design.mechanisms.base import Drawing, Limit, MechanismKind, ModeField, Parameter, Singularity
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.mechanisms.outer_reach import Affine, OuterReach, ReachCone, Values, swing_share
-from tpm_design.mechanisms.parallelograms import rotation_determinant
+from tpm_design.mechanisms.parallelograms import (
+    enclosed_swing_sine,
+    outward_and_hinge,
+    parallelogram_equations,
+    swing_sine,
+)
 from tpm_design.mechanisms.parameters import enclosed_values, limb_values, span, swing_limit
 from tpm_design.mechanisms.rails import (
     CarriageSigns,
@@ -37,7 +41,6 @@ from tpm_design.mechanisms.rails import (
 )
 
 AZIMUTHS = tuple(math.radians(angle) for angle in (-150.0, -30.0, 90.0))
-NO_LIMIT = 2.0
 
 
 class LinearDeltaGeometry(NamedTuple):
@@ -58,6 +61,7 @@ class LinearDeltaGeometry(NamedTuple):
 
 
 rail_equations(LinearDeltaGeometry, on_axes=False)
+parallelogram_equations(LinearDeltaGeometry)
 
 
 @formula(anchor, LinearDeltaGeometry)
@@ -80,16 +84,6 @@ def _swing_margin(geometry, limb, w, h):  # type: ignore[no-untyped-def]
     tx, ty, tz = geometry.hinge[limb]
     aside = w[0] * tx + w[1] * ty + w[2] * tz
     return geometry.strut[limb] * geometry.swing_sine - magnitude(aside)
-
-
-@formula(equations.singularity_margins, LinearDeltaGeometry)
-def _singularity_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
-    """det of the unit struts, det of the unit normals of the parallelograms."""
-    (a, b, c), _, _ = equations.unit_velocity_map(geometry, mode, 1.0, x, y, z)
-    return (
-        determinant(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]),
-        rotation_determinant((a, b, c), geometry.hinge),
-    )
 
 
 @formula(equations.limb_joints, LinearDeltaGeometry)
@@ -140,9 +134,9 @@ def _with_limb_parameters(geometry, limb, values):  # type: ignore[no-untyped-de
 
 def directions(azimuths: Sequence[Any], tilts: Sequence[Any], zero: Any) -> tuple[Any, Any, Any]:
     """ε_i, u_i and τ_i of all limbs from the cosines and sines of their angles."""
-    outward = tuple((c, s, zero) for c, s in azimuths)
+    outward, hinge = outward_and_hinge(azimuths, zero)
     rail = tuple((st * c, st * s, -ct) for (c, s), (ct, st) in zip(azimuths, tilts, strict=True))
-    return outward, rail, tuple((-s, c, zero) for c, s in azimuths)
+    return outward, rail, hinge
 
 
 @dataclass(frozen=True)
@@ -177,9 +171,7 @@ class LinearDelta(Mechanism):
             "hinge": hinge,
             "lowest": (Interval(0.0, 0.0),) * 3,
             "highest": held["rail"],
-            "swing_sine": Interval(NO_LIMIT, NO_LIMIT)
-            if self.swing is None
-            else sine(Interval(self.swing, self.swing)),
+            "swing_sine": enclosed_swing_sine(self.swing),
         }
         return self.geometry._replace(**intervals)
 
@@ -211,7 +203,7 @@ def build(parameters: Mapping[str, float | Sequence[float]], limits: Mapping[str
         limited=1.0,
         lowest=(0.0, 0.0, 0.0),
         highest=values["rail"],
-        swing_sine=NO_LIMIT if swing is None else math.sin(swing),
+        swing_sine=swing_sine(swing),
         link_radius=float(limits.get("link_radius", 0.0)),
     )
     return LinearDelta(kind=KIND, parameters=values, geometry=geometry, swing=swing)

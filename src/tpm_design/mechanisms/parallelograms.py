@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
-from tpm_design.arithmetic import root, sqr
+from tpm_design.arithmetic import Interval, formula, root, sine, sqr
 from tpm_design.arithmetic.algebra import determinant
 from tpm_design.arithmetic.compilation import FAST, STRICT, is_number
+from tpm_design.mechanisms import equations
 
 # isort: split
 from numba import types
 from numba.extending import overload
+
+# a sine that every angle is below
+NO_LIMIT = 2.0
 
 
 def unit_normal(rod: Any, bar: Any) -> Any:
@@ -55,3 +61,33 @@ def _register(stub: Any, implementation: Any) -> None:
 
 _register(unit_normal, _unit_normal)
 _register(rotation_determinant, _rotation_determinant)
+
+
+def _singularity_margins(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
+    """det of the unit rods, det of the unit normals of the parallelograms."""
+    (a, b, c), _, _ = equations.unit_velocity_map(geometry, mode, 1.0, x, y, z)
+    return (
+        determinant(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]),
+        rotation_determinant((a, b, c), geometry.hinge),
+    )
+
+
+def parallelogram_equations(geometry_class: type) -> None:
+    """Register the singularities of rods in parallelograms for a geometry with ``hinge``, the unit vectors
+    along their short bars."""
+    formula(equations.singularity_margins, geometry_class)(_singularity_margins)
+
+
+def outward_and_hinge(azimuths: Sequence[Any], zero: Any) -> tuple[Any, Any]:
+    """ε_i and τ_i = ẑ × ε_i of all limbs from the cosines and sines of their azimuths."""
+    return tuple((c, s, zero) for c, s in azimuths), tuple((-s, c, zero) for c, s in azimuths)
+
+
+def swing_sine(swing: float | None) -> float:
+    """Sine of the limit of the rods' swing (rad), None: more than any has."""
+    return NO_LIMIT if swing is None else math.sin(swing)
+
+
+def enclosed_swing_sine(swing: float | None) -> Interval:
+    """The same as an Interval."""
+    return Interval(NO_LIMIT, NO_LIMIT) if swing is None else sine(Interval(swing, swing))

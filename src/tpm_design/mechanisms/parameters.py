@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tpm_design.arithmetic import Interval
 from tpm_design.errors import ParameterError, did_you_mean
-from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter
+from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter, within
 
 
 def limb_values(
@@ -109,13 +109,7 @@ def checked_value(kind: MechanismKind, parameter: Parameter, value: object) -> f
     """``value`` as a float of the parameter's domain; raises ParameterError otherwise."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ParameterError(f"{kind.name}: {parameter.name} = {value!r} is not a finite number.")
-    allowed = {
-        "positive": value > 0.0,
-        "non-negative": value >= 0.0,
-        "non-zero": value != 0.0,
-        "any": True,
-    }[parameter.domain]
-    if not allowed:
+    if not within(parameter.domain, value, value):
         raise ParameterError(
             f"{kind.name}: {parameter.name} = {value!r} is not {parameter.domain}.",
             remedy=f"It is the {parameter.description}.",

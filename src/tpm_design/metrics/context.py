@@ -100,18 +100,22 @@ class Context:
         return margins.reshape(len(margins), *self.grid.shape[:3])
 
     @cached_property
+    def lattice_sides(self) -> tuple[float, ...]:
+        """The side, ±1, that each determinant mostly keeps on the lattice."""
+        return tuple(1.0 if v.min() + v.max() >= 0.0 else -1.0 for v in self.lattice_determinants)
+
+    @cached_property
     def sides(self) -> tuple[Sides, ...]:
         """Every determinant over the region, in the order of the mechanism."""
         return tuple(self._side(part) for part in range(len(self.mechanism.kind.determinants)))
 
     def side_driven_by(self, drive: str) -> Sides:
         """The determinant whose zero takes control from these actuators: W for motors, V for joints."""
-        name = "actuation" if drive == "motor" else "translation"
-        return self.sides[self.mechanism.kind.determinants.index(name)]
+        kind = self.mechanism.kind
+        return self.sides[kind.determinants.index(kind.guard(drive))]
 
     def _side(self, part: int) -> Sides:
-        values = self.lattice_determinants[part]
-        sign = 1.0 if values.min() + values.max() >= 0.0 else -1.0
+        sign = self.lattice_sides[part]
         extreme = self.least(Index(DETERMINANT, part=part, sign=sign))
         return Sides(sign * extreme.value, extreme.error, tuple(sign * piece for piece in extreme.pieces))
 

@@ -12,9 +12,8 @@ import numpy as np
 from tpm_design.certificates.document import FILE, canonical
 from tpm_design.report.escape import code, code_cell, table, text
 from tpm_design.report.reported import Reported, best_context
-from tpm_design.report.words import asked, pose_text
+from tpm_design.report.words import asked, machines_text, pose_text
 from tpm_design.runs.tables import goal_unit
-from tpm_design.units import si_unit
 
 SENTENCES = {
     "proved": "Proved over the whole region",
@@ -43,7 +42,7 @@ def certificate_lines(reported: Reported) -> list[str]:
         rows.append([code_cell(goal.label), bound, text(str(one["outcome"])), spare, _why(reported, one)])
     headings = ["requirement", "asked", "outcome", "proved to spare", "why"]
     outcome = str(data["outcome"])
-    machines = _machines(reported, data["tolerance"])
+    machines = machines_text(reported.problem.kind, data["tolerance"], reported.study.units)
     sentence = f"{SENTENCES[outcome]}, {machines}."
     if outcome == "refuted":
         sentence = f"{SENTENCES[outcome]} by {machines.removeprefix('for ').replace('every', 'a', 1)}."
@@ -74,18 +73,6 @@ def _unaltered(data: Mapping[str, Any]) -> bool:
     """Whether the contents have the hash that they carry."""
     contents = {name: value for name, value in data.items() if name != "sha256"}
     return hashlib.sha256(canonical(contents)).hexdigest() == data.get("sha256")
-
-
-def _machines(reported: Reported, tolerance: Mapping[str, float]) -> str:
-    parts = []
-    for name, bound in tolerance.items():
-        parameter = reported.problem.kind.parameter(name)
-        unit = si_unit(parameter.dimension if parameter else "length")
-        if bound > 0.0:
-            parts.append(f"{name} ± {reported.study.units.written(bound, unit, 4)}")
-    if not parts:
-        return "for the exact dimensions"
-    return f"for every machine within {', '.join(parts)} (each limb by itself, axis directions exact)"
 
 
 def _why(reported: Reported, one: Mapping[str, Any]) -> str:

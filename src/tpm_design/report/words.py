@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.problem import Goal, Problem
+from tpm_design.runs.tables import parameter_unit
 from tpm_design.units import Units, si_unit
 from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere, Tilt
 
@@ -132,3 +133,20 @@ def range_text(problem: Problem, name: str, units: Units) -> str:
     low, high = units.from_si(variable.lower, unit), units.from_si(variable.upper, unit)
     side = ", on the octant's side" if variable.mirrored else ""
     return f"{low:.6g} … {high:.6g}{name}{side}"
+
+
+def tolerances_text(kind: MechanismKind, tolerance: Mapping[str, float], units: Units) -> str:
+    """Tolerances (SI) in the study's units: ``f ± 0.1 mm, r ± 0.1 mm``; empty where there are none."""
+    return ", ".join(
+        f"{name} ± {units.written(bound, parameter_unit(kind, name), 4)}"
+        for name, bound in tolerance.items()
+        if bound > 0.0
+    )
+
+
+def machines_text(kind: MechanismKind, tolerance: Mapping[str, float], units: Units) -> str:
+    """For which machines something is proved."""
+    tolerances = tolerances_text(kind, tolerance, units)
+    if not tolerances:
+        return "for the exact dimensions"
+    return f"for every machine within {tolerances} (each limb by itself, axis directions exact)"

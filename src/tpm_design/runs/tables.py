@@ -8,6 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.problem import Evaluation, Goal, Problem
 from tpm_design.runs.search import Entry
 from tpm_design.units import Units, si_unit, unit_for
@@ -29,13 +30,14 @@ def parameter_columns(problem: Problem, units: Units) -> list[Column]:
     columns = []
     for name in order:
         if name in free or name in problem.fixed or name in problem.ties:
-            unit = "" if name == "mode" else free.get(name) or _fixed_unit(problem, name)
+            unit = "" if name == "mode" else free.get(name) or parameter_unit(problem.kind, name)
             columns.append(Column(name, unit, name if not unit else units.heading(name, unit)))
     return columns
 
 
-def _fixed_unit(problem: Problem, name: str) -> str:
-    parameter = problem.kind.parameter(name)
+def parameter_unit(kind: MechanismKind, name: str) -> str:
+    """SI unit of a parameter, or of a coordinate of the region's centre."""
+    parameter = kind.parameter(name)
     return si_unit(parameter.dimension if parameter else "length")
 
 

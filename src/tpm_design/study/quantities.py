@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from tpm_design.mechanisms.base import Dimension, Domain, MechanismKind
+from tpm_design.mechanisms.base import Dimension, Domain, MechanismKind, within
 from tpm_design.problem import Variable
 from tpm_design.study.document import Place
 from tpm_design.study.faults import Faults
@@ -27,17 +27,6 @@ def meaning(name: str, kind: MechanismKind, *, mirrored: bool = False) -> tuple[
     if parameter is None:
         raise KeyError(name)
     return parameter.dimension, parameter.domain
-
-
-def within(domain: Domain, low: float, high: float) -> bool:
-    """Whether every number from ``low`` to ``high`` is in the domain."""
-    if domain == "positive":
-        return low > 0
-    if domain == "non-negative":
-        return low >= 0
-    if domain == "non-zero":
-        return low > 0 or high < 0
-    return True
 
 
 def domain_words(domain: Domain) -> str:

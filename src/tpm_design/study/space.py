@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tpm_design.errors import did_you_mean
-from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter
+from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter, within
 from tpm_design.problem import Variable
 from tpm_design.study.document import Place
 from tpm_design.study.faults import Faults, shown
@@ -22,7 +22,7 @@ from tpm_design.study.model import (
     Quantity,
     Range,
 )
-from tpm_design.study.quantities import domain_words, interval, meaning, read_quantity, within
+from tpm_design.study.quantities import domain_words, interval, meaning, read_quantity
 from tpm_design.units import Units, si_unit
 
 Modes = dict[str, dict[str, str]]

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
 from tpm_design.errors import did_you_mean
+from tpm_design.mechanisms.base import within
 from tpm_design.problem import Problem, Variable
 from tpm_design.study.document import Place
 from tpm_design.study.faults import Faults, shown
 from tpm_design.study.model import LARGEST_GRID, GridModel, Listed, ListModel, SampleModel, Steps
 from tpm_design.study.plain import plain
-from tpm_design.study.quantities import domain_words, meaning, within
+from tpm_design.study.quantities import domain_words, meaning
 from tpm_design.units import Units, si_unit
 
 Item = TypeVar("Item")
