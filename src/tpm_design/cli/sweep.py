@@ -43,14 +43,13 @@ def sweep_one(
 ) -> int | None:
     part, threads = _shard(shard), worker_threads(workers)
     study = load_study(path, allow_code=allow_code)
-    held = held_values(study)
-    if held and not (quiet or as_json):
-        print("Held: " + "; ".join(held) + ".\n")
     folder = None if resume is None else run_to_resume(study, resume, output, part)
     if folder is not None:
         check_resumable(study, folder, part)
     check_dask(dask, workers, [study])
-    count = len(sweep_points(study, part))
+    held, count = held_values(study), len(sweep_points(study, part))
+    if held and not (quiet or as_json):
+        print("Held: " + "; ".join(held) + ".\n")
     with (
         evaluators(dask, threads) as executor,
         sweep_progress(count, quiet=quiet or as_json) as watch,

@@ -243,6 +243,8 @@ def _local_cluster(processes: int) -> Iterator[Any]:
             processes=True,
             host="127.0.0.1",
             dashboard_address=None,
+            # its web server is on port 8787 otherwise, which may be taken
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
             memory_limit=0,
             silence_logs=logging.CRITICAL,
             env=dict.fromkeys(THREADS, "1"),
