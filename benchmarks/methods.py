@@ -78,12 +78,11 @@ def optuna_tpe(problem: Problem, budget: int, seed: int) -> Sequence[Evaluation]
             for v in problem.variables
         }
         done.append(evaluate(problem, space.completed(values)))
-        trial.set_user_attr("shortfalls", [-float(c) for c in seen(problem, done[-1:])[1][0]])
+        for goal, constraint in zip(problem.constraints, seen(problem, done[-1:])[1][0], strict=True):
+            trial.set_constraint(goal.label, -float(constraint))
         return minimised(problem, done[-1])
 
-    sampler = optuna.samplers.TPESampler(
-        seed=seed, constraints_func=lambda trial: trial.user_attrs["shortfalls"]
-    )
+    sampler = optuna.samplers.TPESampler(seed=seed)
     optuna.create_study(sampler=sampler).optimize(objective, n_trials=budget)
     return done
 
