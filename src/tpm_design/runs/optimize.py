@@ -13,6 +13,7 @@ from tpm_design.errors import RefusedError
 from tpm_design.optimizers import check_pair, optimizer
 from tpm_design.optimizers.base import BudgetSpent, Optimizer, Stalled
 from tpm_design.problem import Goal, Problem, Sample
+from tpm_design.runs.executors import Executor
 from tpm_design.runs.replay import answers_in, left_over
 from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch, best_entry
 from tpm_design.synthesis.bound import ReachBound
@@ -118,15 +119,20 @@ def search(
     workers: int,
     record: Callable[[Entry], None],
     stored: Sequence[Entry] = (),
+    executor: Executor | None = None,
 ) -> SearchResult:
     """Run the plan. ``record`` gets each evaluation as it ends. Raises what ``check_plan`` raises.
+
+    ``executor``: who evaluates, ``workers`` threads if None.
 
     ``stored``: the log of an earlier search for the same problem; what is asked for again is answered from
     it. What is not, because the budget is another one, comes last and may be the best.
     Ctrl-C ends the search as "interrupted" with everything evaluated so far.
     """
     check_plan(problem, plan)
-    log = EvaluationLog(problem, workers=workers, record=record, answers=answers_in(stored))
+    log = EvaluationLog(
+        problem, workers=workers, record=record, answers=answers_in(stored), executor=executor
+    )
     try:
         ending, detail = search_all(log, plan, plan.budget)
     except KeyboardInterrupt:

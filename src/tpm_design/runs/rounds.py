@@ -14,6 +14,7 @@ from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.optimizers import optimizer
 from tpm_design.optimizers.base import BudgetSpent
 from tpm_design.problem import Goal, Problem, Sample
+from tpm_design.runs.executors import Executor
 from tpm_design.runs.optimize import (
     Round,
     SearchPlan,
@@ -65,6 +66,7 @@ def search_certified(
     workers: int,
     record: Callable[[Entry], None],
     stored: Sequence[Entry] = (),
+    executor: Executor | None = None,
 ) -> SearchResult:
     """Search and certify in rounds, until the best design is proved, no round can help or the budget ends.
 
@@ -74,10 +76,11 @@ def search_certified(
 
     ``stored``: the log of an earlier search for the same problem; a design that is asked for again and judged
     by the same samples is answered from it, verdicts are found anew. With another budget the rounds are
-    other ones: what they do not ask for is dropped at the end.
+    other ones: what they do not ask for is dropped at the end. ``executor``: who evaluates, ``workers``
+    threads if None; these prove in any case.
     """
     check_plan(problem, plan)
-    course = _Course(problem, plan, proving, workers, record, answers_in(stored))
+    course = _Course(problem, plan, proving, workers, record, answers_in(stored), executor)
     try:
         ending, detail = course.run()
     except KeyboardInterrupt:
@@ -111,9 +114,10 @@ class _Course:
         workers: int,
         record: Callable[[Entry], None],
         answers: Answers,
+        executor: Executor | None,
     ) -> None:
         self._problem, self._plan, self._proving, self._workers = problem, plan, proving, workers
-        self._record, self._answers = record, answers
+        self._record, self._answers, self._executor = record, answers, executor
         self._samples: tuple[Sample, ...] = ()
         self._first = 0
         self.entries: list[Entry] = []
@@ -165,6 +169,7 @@ class _Course:
             first=self._first,
             round_number=len(self.rounds) + 1,
             answers=self._answers,
+            executor=self._executor,
         )
         try:
             if not self.rounds:

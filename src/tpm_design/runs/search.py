@@ -1,4 +1,4 @@
-"""The problem as an optimiser sees it: budgeted, memoised, logged, evaluated by several threads."""
+"""The problem as an optimiser sees it: budgeted, memoised, logged, evaluated by several workers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tpm_design.design_space import DesignSpace
 from tpm_design.optimizers.base import BudgetSpent, Outcomes
 from tpm_design.problem import Design, Evaluation, Goal, Problem, Sample, evaluate
+from tpm_design.runs.executors import Executor, Threads, in_order
 from tpm_design.synthesis.bound import relaxed_designs
 
 FloatArray = NDArray[np.float64]
@@ -52,7 +53,8 @@ class EvaluationLog:
     """Every distinct design evaluated so far in one round. The one place that counts evaluations.
 
     ``record`` is called with each entry, in order, as soon as it is there. ``first``: number of the first.
-    ``answers``: evaluations that need not be repeated; they count like others.
+    ``answers``: evaluations that need not be repeated; they count like others. ``executor``: who evaluates,
+    ``workers`` threads of its own if None.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class EvaluationLog:
         first: int = 0,
         round_number: int = 1,
         answers: Answers = MappingProxyType({}),
+        executor: Executor | None = None,
     ) -> None:
         self.problem = problem
         self.judged_by = samples_digest(problem.samples)
@@ -73,12 +76,13 @@ class EvaluationLog:
         self.entries: list[Entry] = []
         self._places: dict[Key, int] = {}
         self._record = record
-        self._pool = ThreadPoolExecutor(max_workers=workers) if workers > 1 else None
+        self._executor: Executor = Threads(workers) if executor is None else executor
+        self._is_own = executor is None
 
     def close(self) -> None:
-        """End the worker threads; evaluations not begun are dropped."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
+        """End the log's own threads; evaluations not begun are dropped."""
+        if self._is_own:
+            self._executor.close()
 
     def evaluations(self, designs: Sequence[Design], limit: int) -> list[Evaluation]:
         """Evaluations of the designs, in order; repeated ones are answered from the log.
@@ -93,19 +97,19 @@ class EvaluationLog:
                 fresh[key] = design
         allowed = max(0, limit - len(self.entries))
         wanted = list(fresh.items())[:allowed]
-        run = map if self._pool is None else self._pool.map
-        for (key, _), result in zip(wanted, run(self._evaluation, wanted), strict=True):
-            self._places[key] = len(self.entries)
-            entry = Entry(self.first + len(self.entries), result, self.round_number, self.judged_by)
-            self.entries.append(entry)
-            self._record(entry)
+        answers = [self._answers.get((self.judged_by, key)) for key, _ in wanted]
+        unanswered = [design for (_, design), answer in zip(wanted, answers, strict=True) if answer is None]
+        with closing(self._executor.as_they_end(evaluate, self.problem, unanswered)) as evaluated:
+            results = in_order(evaluated)
+            for (key, _), answer in zip(wanted, answers, strict=True):
+                result = answer or next(results)
+                self._places[key] = len(self.entries)
+                entry = Entry(self.first + len(self.entries), result, self.round_number, self.judged_by)
+                self.entries.append(entry)
+                self._record(entry)
         if len(wanted) < len(fresh):
             raise BudgetSpent
         return [self.entries[self._places[key]].evaluation for key in keys]
-
-    def _evaluation(self, item: tuple[Key, Design]) -> Evaluation:
-        key, design = item
-        return self._answers.get((self.judged_by, key)) or evaluate(self.problem, design)
 
     def best(self) -> Entry | None:
         """As ``best_entry``."""
