@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -28,7 +28,9 @@ class Variable:
     """One free quantity. Continuous: ``lower``..``upper``. Otherwise one of ``values`` (SI or mode labels).
 
     ``mirrored``: the value takes the sign of the mode's octant along that axis, so that a search over
-    octants keeps one range.
+    octants keeps one range. ``scale``: "log" is searched by its logarithm, ``lower`` > 0. ``ratio_of``: the
+    parameter that it is searched as a multiple of; ``lower``, ``upper`` and ``initial`` are multiples then,
+    its value in a design is SI like any other.
     """
 
     name: str
@@ -38,6 +40,8 @@ class Variable:
     values: tuple[float, ...] | tuple[str, ...] = ()
     initial: float | str | None = None
     mirrored: bool = False
+    scale: Literal["linear", "log"] = "linear"
+    ratio_of: str | None = None
 
 
 @dataclass(frozen=True)
@@ -117,6 +121,40 @@ class Evaluation:
 def with_ties(ties: Mapping[str, str], design: Design) -> Design:
     """The design with every tied parameter at the value of the one it names."""
     return {**design, **{name: design[source] for name, source in ties.items()}}
+
+
+def with_ratios(variables: Sequence[Variable], multiples: Mapping[str, float], design: Design) -> Design:
+    """The design with every variable named in ``multiples`` at that multiple of the parameter it is a ratio
+    of, which may be such a variable itself."""
+    sources = {variable.name: variable.ratio_of for variable in variables}
+    found: dict[str, float | str] = dict(design)
+    left = dict(multiples)
+
+    def settle(name: str) -> float:
+        if name in left:
+            found[name] = left.pop(name) * settle(str(sources[name]))
+        return float(found[name])
+
+    for name in multiples:
+        settle(name)
+    return found
+
+
+def with_changes(problem: Problem, design: Design, values: Design) -> Design:
+    """A design with other ``values`` (SI) of some quantities. What is a ratio of one that changes remains the
+    same multiple of it, unless it is given itself, and what is tied follows."""
+    changed: Design = {**design, **values}
+    left = [variable for variable in problem.variables if variable.ratio_of and variable.name not in values]
+    while left:
+        # those whose own parameter is settled first
+        names = {variable.name for variable in left}
+        ready = [variable for variable in left if variable.ratio_of not in names]
+        for variable in ready:
+            before, after = float(design[str(variable.ratio_of)]), float(changed[str(variable.ratio_of)])
+            if before not in (after, 0.0):
+                changed = {**changed, variable.name: float(design[variable.name]) / before * after}
+        left = [variable for variable in left if variable not in ready]
+    return with_ties(problem.ties, changed)
 
 
 def evaluate(problem: Problem, design: Design) -> Evaluation:
