@@ -9,13 +9,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tpm_design as tpm
-from tpm_design.design_space import DesignSpace, coordinate_at, octant_signs, spans, value_at, values_at
+from tpm_design.design_space import (
+    DesignSpace,
+    coordinate_at,
+    octant_signs,
+    spans,
+    value_at,
+    values_at,
+    with_changes,
+)
 from tpm_design.errors import StudyError
-from tpm_design.problem import Problem, Variable, with_changes
+from tpm_design.problem import Problem, Variable
 from tpm_design.report.readings import at_end
 from tpm_design.report.words import range_text
 from tpm_design.study import choose_design
@@ -71,6 +79,7 @@ def ranges(draw: st.DrawFn) -> Variable:
 # --------------------------------------------------------------------------------- one range
 
 
+@settings(deadline=None)
 @given(ranges(), shares)
 def test_a_coordinate_comes_back_from_its_value(variable: Variable, share: float) -> None:
     value = float(value_at(variable, share))
@@ -80,6 +89,7 @@ def test_a_coordinate_comes_back_from_its_value(variable: Variable, share: float
         assert coordinate_at(variable, -value) == coordinate_at(variable, value)
 
 
+@settings(deadline=None)
 @given(ranges())
 def test_the_ends_of_a_range_are_exact(variable: Variable) -> None:
     for share, end in ((0.0, variable.lower), (1.0, variable.upper)):
@@ -89,6 +99,7 @@ def test_the_ends_of_a_range_are_exact(variable: Variable) -> None:
     assert value_at(variable, 1.1) == variable.upper
 
 
+@settings(deadline=None)
 @given(ranges(), shares, st.floats(0.0, 0.2))
 def test_equal_steps_of_a_log_coordinate_are_equal_factors(
     variable: Variable, share: float, step: float
@@ -109,6 +120,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     return loaded(tmp_path_factory.mktemp("shares"))
 
 
+@settings(deadline=None)
 @given(coordinates=st.tuples(shares, shares, shares, shares))
 def test_a_ratio_holds_in_every_design(study: Study, coordinates: tuple[float, ...]) -> None:
     problem = study.problem
@@ -125,6 +137,7 @@ def test_a_ratio_holds_in_every_design(study: Study, coordinates: tuple[float, .
         assert low <= float(design[name]) <= high
 
 
+@settings(deadline=None)
 @given(coordinates=st.tuples(shares, shares, shares, shares), share=st.floats(0.01, 0.3))
 def test_a_neighbourhood_keeps_scales_and_ratios(
     study: Study, coordinates: tuple[float, ...], share: float

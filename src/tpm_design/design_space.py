@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.problem import CENTRE, Design, Variable, with_ratios, with_ties
+from tpm_design.problem import CENTRE, Design, Problem, Variable, with_ties
 
 FloatArray = NDArray[np.float64]
 
@@ -179,3 +179,37 @@ def octant_signs(modes: Mapping[str, Mapping[str, str]]) -> dict[str, tuple[floa
         x, y, z = (meaning[sign] for sign in text) if text != "any" else (0.0, 0.0, 0.0)
         signs[label] = (x, y, z)
     return signs
+
+
+def with_ratios(variables: Sequence[Variable], multiples: Mapping[str, float], design: Design) -> Design:
+    """The design with every variable named in ``multiples`` at that multiple of the parameter it is a ratio
+    of, which may be such a variable itself."""
+    sources = {variable.name: variable.ratio_of for variable in variables}
+    found: dict[str, float | str] = dict(design)
+    left = dict(multiples)
+
+    def settle(name: str) -> float:
+        if name in left:
+            found[name] = left.pop(name) * settle(str(sources[name]))
+        return float(found[name])
+
+    for name in multiples:
+        settle(name)
+    return found
+
+
+def with_changes(problem: Problem, design: Design, values: Design) -> Design:
+    """A design with other ``values`` (SI) of some quantities. What is a ratio of one that changes remains the
+    same multiple of it, unless it is given itself, and what is tied follows."""
+    changed: Design = {**design, **values}
+    left = [variable for variable in problem.variables if variable.ratio_of and variable.name not in values]
+    while left:
+        # those whose own parameter is settled first
+        names = {variable.name for variable in left}
+        ready = [variable for variable in left if variable.ratio_of not in names]
+        for variable in ready:
+            before, after = float(design[str(variable.ratio_of)]), float(changed[str(variable.ratio_of)])
+            if before not in (after, 0.0):
+                changed = {**changed, variable.name: float(design[variable.name]) / before * after}
+        left = [variable for variable in left if variable not in ready]
+    return with_ties(problem.ties, changed)

@@ -16,9 +16,10 @@ from tpm_design.cli.guard import INTERRUPTED, NOT_PROVED, NOTHING_FEASIBLE
 from tpm_design.cli.progress import search_progress
 from tpm_design.cli.results import design_rows, evaluation_data, limit_text, result_text
 from tpm_design.cli.text import table
+from tpm_design.design_space import with_changes
 from tpm_design.errors import UsageError
 from tpm_design.mechanisms import mechanism_kind
-from tpm_design.problem import Design, evaluate, with_changes
+from tpm_design.problem import Design, evaluate
 from tpm_design.report.words import gap_text, pose_text, pose_unit_names
 from tpm_design.runs.folder import STUDY, newest_run, read_run
 from tpm_design.runs.optimality import gap_of
