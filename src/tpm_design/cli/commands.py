@@ -17,9 +17,10 @@ from tpm_design.cli.guard import INTERRUPTED, NOT_PROVED, NOTHING_FEASIBLE
 from tpm_design.cli.progress import search_progress
 from tpm_design.cli.results import design_rows, evaluation_data, limit_text, result_text
 from tpm_design.cli.text import table
+from tpm_design.design_space import with_changes
 from tpm_design.errors import UsageError
 from tpm_design.mechanisms import mechanism_kind
-from tpm_design.problem import Design, evaluate, with_ties
+from tpm_design.problem import Design, evaluate
 from tpm_design.report.words import gap_text, pose_text, pose_unit_names
 from tpm_design.runs.executors import SWITCH_INTERVAL, Executor
 from tpm_design.runs.folder import STUDY, newest_run, read_run
@@ -110,8 +111,7 @@ def chosen_design(
     design, assumptions = choose_design(study, given)
     if stored is None:
         return study, design, assumptions
-    changed = {**stored, **{name: design[name] for name in given}}
-    return study, with_ties(study.problem.ties, changed), ()
+    return study, with_changes(study.problem, stored, {name: design[name] for name in given}), ()
 
 
 def evaluate_one(

@@ -14,7 +14,7 @@ from tpm_design.certificates.document import FILE as CERTIFICATE
 from tpm_design.certificates.document import document, write_document
 from tpm_design.certificates.verdict import Verdict
 from tpm_design.errors import UsageError, did_you_mean
-from tpm_design.problem import Design, Evaluation, evaluate, with_ties
+from tpm_design.problem import Design, Evaluation, evaluate
 from tpm_design.runs.executors import Executor
 from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run, text_hash
 from tpm_design.runs.lock import sole_writer
@@ -22,9 +22,9 @@ from tpm_design.runs.optimality import gap_of, with_bound
 from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, search
 from tpm_design.runs.replay import answers_in
 from tpm_design.runs.rounds import Proving, search_certified
-from tpm_design.runs.search import Entry, design_key
+from tpm_design.runs.search import Entry, answer_key
 from tpm_design.runs.tables import EvaluationTable, csv_line
-from tpm_design.study.design import choose_design, tied_error
+from tpm_design.study.design import completed_design, tied_error
 from tpm_design.study.plain import dump_yaml
 from tpm_design.study.resuming import check_resumable
 
@@ -53,13 +53,13 @@ def evaluate_design(study: Study, values: Mapping[str, float | str]) -> Evaluati
 
     Raises UsageError on a name the study does not have.
     """
-    design, _ = choose_design(study, {})
+    known = completed_design(study.problem, {})
     for name in values:
-        if name not in design:
-            raise UsageError(f"This study has no quantity {name!r}.", remedy=did_you_mean(name, design))
+        if name not in known:
+            raise UsageError(f"This study has no quantity {name!r}.", remedy=did_you_mean(name, known))
         if name in study.problem.ties:
             raise tied_error(study.problem.ties, name)
-    return evaluate(study.problem, with_ties(study.problem.ties, {**design, **values}))
+    return evaluate(study.problem, completed_design(study.problem, values))
 
 
 def plan_of(study: Study) -> SearchPlan:
@@ -142,7 +142,7 @@ def _written(
         known = frozenset(answers_in(stored or ()))
 
         def record(entry: Entry) -> None:
-            if (entry.judged_by, design_key(entry.evaluation.design)) not in known:
+            if answer_key(entry) not in known:
                 writer.record(entry)
             watch(entry)
 
