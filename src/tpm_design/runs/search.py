@@ -52,7 +52,8 @@ class EvaluationLog:
     """Every distinct design evaluated so far in one round. The one place that counts evaluations.
 
     ``record`` is called with each entry, in order, as soon as it is there. ``first``: number of the first.
-    ``answers``: evaluations that need not be repeated; they count like others.
+    ``answers``: evaluations that need not be repeated; they count like others. ``optima``: designs that the
+    method noted as local optima.
     """
 
     def __init__(
@@ -71,6 +72,7 @@ class EvaluationLog:
         self.first = first
         self.round_number = round_number
         self.entries: list[Entry] = []
+        self.optima: tuple[Design, ...] = ()
         self._places: dict[Key, int] = {}
         self._record = record
         self._pool = ThreadPoolExecutor(max_workers=workers) if workers > 1 else None
@@ -144,6 +146,19 @@ class UnitSearch:
         table = np.atleast_2d(np.asarray(points, dtype=np.float64))
         results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
         return outcomes(self.log.problem, results, self.sizes)
+
+    def in_pieces(self) -> UnitSearch:
+        """The same search, each constraint in as many smooth pieces as a design in the log had."""
+        pieces = [entry.evaluation.pieces for entry in self.log.entries]
+        labels = [goal.label for goal in self.log.problem.constraints]
+        sizes = tuple(
+            max((len(found.get(label, ())) for found in pieces), default=1) or 1 for label in labels
+        )
+        return replace(self, sizes=sizes)
+
+    def note_optima(self, points: FloatArray) -> None:
+        """The local optima (N, n) that the method knows by now."""
+        self.log.optima = tuple(self.space.design(point) for point in points)
 
     def relaxed_optima(self) -> FloatArray:
         """Points (N, n) of the convex relaxation's designs, see ``synthesis``. Raises RefusedError where the
