@@ -105,8 +105,8 @@ def descend(
     """Walk downhill from ``start`` in the variables ``free`` (their numbers), the others held.
 
     ``radius``: of the first trust region; ``fine``: of the last. ``abandoned``: asked at every new place
-    whether to give up. Sources: R. Fletcher, Practical methods of optimization, 1987, 14.4 (exact penalty in a trust
-    region, correction of second order); M. J. D. Powell, 1978 (damped update of the curvature).
+    whether to give up. Sources: R. Fletcher, Practical methods of optimization, 1987, 14.4 (exact penalty in
+    a trust region, correction of second order); M. J. D. Powell, 1978 (damped update of the curvature).
     """
     if not len(free):
         return _standing(start)

@@ -15,8 +15,9 @@ from tpm_design.optimizers.watch import Watch
 SAMPLES = 16
 """Points of the first sample for each variable and one more, at least; further samples are as large."""
 
-APART = 0.1
-"""Least distance of starts from each other and from optima, times the root of the dimension."""
+APART, CLOSER = 0.1, 0.7
+"""Least distance of starts from each other and from optima, times the root of the dimension; the factor on it
+where a whole sample has nothing so far away."""
 
 SPREAD = 0.5
 """By which share of the sample a discrete choice falls back with each start that it had."""
@@ -44,6 +45,7 @@ class Starts:
         self._batch = 2 ** ceil(log2(SAMPLES * (search.dimension + 1)))
         self._samples: list[Place] = []
         self._used: list[FloatArray] = []
+        self._apart = APART * np.sqrt(search.dimension)
 
     def sample(self) -> None:
         """Evaluate another batch."""
@@ -59,6 +61,7 @@ class Starts:
             return self._take(self._samples[0])
         while (found := self._most_promising(optima)) is None:
             self.sample()
+            self._apart *= CLOSER
         return self._take(found)
 
     def _take(self, place: Place) -> Place:
@@ -72,7 +75,6 @@ class Starts:
 
     def _most_promising(self, optima: Sequence[FloatArray]) -> Place | None:
         samples = self._samples
-        apart = APART * np.sqrt(self._search.dimension)
         objectives = np.array([place.objective for place in samples])
         shortfalls = np.maximum(0.0, -np.array([place.constraints for place in samples]))
         sizes = np.median(np.abs([place.constraints for place in samples]), axis=0)
@@ -86,7 +88,7 @@ class Starts:
         taken = np.array([*self._used, *optima])
         for number in map(int, np.argsort(scores, kind="stable")):
             place = samples[number]
-            if np.sqrt(((taken - place.point) ** 2).sum(axis=1)).min() > apart:
+            if np.sqrt(((taken - place.point) ** 2).sum(axis=1)).min() > self._apart:
                 return place
         return None
 

@@ -53,7 +53,7 @@ class EvaluationLog:
 
     ``record`` is called with each entry, in order, as soon as it is there. ``first``: number of the first.
     ``answers``: evaluations that need not be repeated; they count like others. ``optima``: designs that the
-    method noted as local optima.
+    method noted as local optima. ``most_pieces``: in how many pieces each constraint came, at most.
     """
 
     def __init__(
@@ -73,6 +73,7 @@ class EvaluationLog:
         self.round_number = round_number
         self.entries: list[Entry] = []
         self.optima: tuple[Design, ...] = ()
+        self.most_pieces: dict[str, int] = {}
         self._places: dict[Key, int] = {}
         self._record = record
         self._pool = ThreadPoolExecutor(max_workers=workers) if workers > 1 else None
@@ -100,6 +101,8 @@ class EvaluationLog:
             self._places[key] = len(self.entries)
             entry = Entry(self.first + len(self.entries), result, self.round_number, self.judged_by)
             self.entries.append(entry)
+            for label, pieces in result.pieces.items():
+                self.most_pieces[label] = max(len(pieces), self.most_pieces.get(label, 1))
             self._record(entry)
         if len(wanted) < len(fresh):
             raise BudgetSpent
@@ -149,12 +152,8 @@ class UnitSearch:
 
     def in_pieces(self) -> UnitSearch:
         """The same search, each constraint in as many smooth pieces as a design in the log had."""
-        pieces = [entry.evaluation.pieces for entry in self.log.entries]
-        labels = [goal.label for goal in self.log.problem.constraints]
-        sizes = tuple(
-            max((len(found.get(label, ())) for found in pieces), default=1) or 1 for label in labels
-        )
-        return replace(self, sizes=sizes)
+        most = self.log.most_pieces
+        return replace(self, sizes=tuple(most.get(goal.label, 1) for goal in self.log.problem.constraints))
 
     def note_optima(self, points: FloatArray) -> None:
         """The local optima (N, n) that the method knows by now."""
