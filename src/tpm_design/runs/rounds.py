@@ -13,8 +13,9 @@ from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.optimizers import optimizer
 from tpm_design.optimizers.base import BudgetSpent
-from tpm_design.problem import Goal, Problem, Sample
+from tpm_design.problem import Design, Goal, Problem, Sample
 from tpm_design.runs.executors import Executor
+from tpm_design.runs.optima import distinct_optima
 from tpm_design.runs.optimize import (
     Round,
     SearchPlan,
@@ -25,6 +26,7 @@ from tpm_design.runs.optimize import (
     remarks_on,
     run_method,
     search_all,
+    space_of,
     status_sentence,
     view_of,
 )
@@ -100,6 +102,7 @@ def search_certified(
         remarks_on(plan, problem),
         tuple(course.rounds),
         found,
+        optima=distinct_optima(problem, space_of(problem), best, entries, course.optima),
     )
 
 
@@ -123,6 +126,7 @@ class _Course:
         self.entries: list[Entry] = []
         self.rounds: list[Round] = []
         self.verdicts: dict[int, Verdict] = {}
+        self.optima: list[Design] = []
 
     def run(self) -> tuple[str, str]:
         """All rounds: the ending and a sentence on it."""
@@ -187,6 +191,7 @@ class _Course:
         finally:
             log.close()
             self.entries += log.entries
+            self.optima += log.optima
 
     def _start_again(self, log: EvaluationLog, limit: int) -> None:
         """Judge the best entries of the round before by all samples."""
@@ -204,7 +209,7 @@ class _Course:
 
 def starting_entries(problem: Problem, entries: Sequence[Entry], most: int) -> list[Entry]:
     """The best entry of each choice of the discrete variables, best first, then the next best of all."""
-    space = view_of(EvaluationLog(problem, workers=1), 1).space
+    space = space_of(problem)
     ordered = sorted(entries, key=lambda entry: rank(problem, entry))
     firsts = {discrete_choice(space, entry): entry for entry in reversed(ordered)}
     chosen = [entry for entry in ordered if firsts[discrete_choice(space, entry)] is entry]

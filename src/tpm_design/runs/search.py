@@ -70,7 +70,8 @@ class EvaluationLog:
 
     ``record`` is called with each entry, in order, as soon as it is there. ``first``: number of the first.
     ``answers``: evaluations that need not be repeated; they count like others. ``executor``: who evaluates,
-    ``workers`` threads of its own if None.
+    ``workers`` threads of its own if None. ``optima``: designs that the method noted as local optima.
+    ``most_pieces``: in how many pieces each constraint came, at most.
     """
 
     def __init__(
@@ -90,6 +91,8 @@ class EvaluationLog:
         self.first = first
         self.round_number = round_number
         self.entries: list[Entry] = []
+        self.optima: tuple[Design, ...] = ()
+        self.most_pieces: dict[str, int] = {}
         self._places: dict[Key, int] = {}
         self._record = record
         self._executor: Executor = Threads(workers) if executor is None else executor
@@ -126,6 +129,8 @@ class EvaluationLog:
                 self._places[key] = len(self.entries)
                 entry = Entry(self.first + len(self.entries), result, self.round_number, self.judged_by)
                 self.entries.append(entry)
+                for label, pieces in result.pieces.items():
+                    self.most_pieces[label] = max(len(pieces), self.most_pieces.get(label, 1))
                 self._record(entry)
         if len(wanted) < len(fresh):
             raise BudgetSpent
@@ -194,6 +199,15 @@ class UnitSearch:
             cutoff = cutoff_at(self.log.problem, results, keep)
             results += self.log.evaluations(designs[first : first + SCREENED], self.limit, cutoff)
         return outcomes(self.log.problem, results, self.sizes)
+
+    def in_pieces(self) -> UnitSearch:
+        """The same search, each constraint in as many smooth pieces as a design in the log had."""
+        most = self.log.most_pieces
+        return replace(self, sizes=tuple(most.get(goal.label, 1) for goal in self.log.problem.constraints))
+
+    def note_optima(self, points: FloatArray) -> None:
+        """The local optima (N, n) that the method knows by now."""
+        self.log.optima = tuple(self.space.design(point) for point in points)
 
     def relaxed_optima(self) -> FloatArray:
         """Points (N, n) of the convex relaxation's designs, see ``synthesis``. Raises RefusedError where the

@@ -154,6 +154,7 @@ def _written(
             "status": result.status,
             "ending": result.ending,
             "best_id": None if result.best is None else result.best.number,
+            "optima_ids": [entry.number for entry in result.optima],
             "feasible": result.best is not None and result.best.evaluation.status == "feasible",
             "evaluations": len(result.entries),
             "method": plan.method,
@@ -170,7 +171,7 @@ def _written(
             **({} if stored is None else {"resumed_after": len(stored)}),
             "seconds": round(time.perf_counter() - began, 3),
         }
-        writer.finish(result.entries, [result.best] if result.best else [], summary)
+        writer.finish(result.entries, result.optima, summary)
     return result
 
 
