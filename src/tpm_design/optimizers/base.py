@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +24,13 @@ class Stalled(Exception):  # noqa: N818 - an ordinary end of a search, not an er
 @dataclass(frozen=True)
 class Outcomes:
     """Values at N points: ``objective`` (N,) to minimise, ``constraints`` (N, m) met where ≥ 0 (each
-    divided by its metric's scale), ``merit`` (N,) = objective + exact penalty, finite everywhere."""
+    divided by its metric's scale), ``merit`` (N,) = objective + exact penalty, finite everywhere.
+    ``objectives`` (N, k): all of them, each to minimise, of a ``FrontSearch``."""
 
     objective: FloatArray
     constraints: FloatArray
     merit: FloatArray
+    objectives: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
 
 class Search(Protocol):
@@ -52,6 +54,14 @@ class Search(Protocol):
         ...
 
 
+@runtime_checkable
+class FrontSearch(Search, Protocol):
+    """A search that tells all its objectives."""
+
+    @property
+    def objective_count(self) -> int: ...
+
+
 @dataclass(frozen=True)
 class Abilities:
     """What a method can work with.
@@ -60,7 +70,8 @@ class Abilities:
     may be given variables with levels. ``derivatives``: it follows gradients, so every metric must be
     differentiable. ``random``: its path depends on the seed. ``whole_space``: global, as opposed to
     local from ``start``. ``batch``: it evaluates whole populations at once, so workers help.
-    ``relaxation``: it solves a convex relaxation of the problem, which must have one.
+    ``relaxation``: it solves a convex relaxation of the problem, which must have one. ``front``: it
+    searches the front of two objectives or more, and only that; at most ``most_objectives``.
     """
 
     constraints: bool
@@ -72,6 +83,8 @@ class Abilities:
     smallest_dimension: int = 1
     largest_dimension: int | None = None
     relaxation: bool = False
+    front: bool = False
+    most_objectives: int | None = None
 
 
 @dataclass(frozen=True)

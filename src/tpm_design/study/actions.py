@@ -18,7 +18,9 @@ from tpm_design.problem import Design, Evaluation, evaluate, with_ties
 from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run, text_hash
 from tpm_design.runs.lock import sole_writer
 from tpm_design.runs.optimality import gap_of, with_bound
+from tpm_design.runs.marks import front_marks
 from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, search
+from tpm_design.runs.proved_knee import with_proved_knee
 from tpm_design.runs.rounds import Proving, search_certified
 from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import EvaluationTable, csv_line
@@ -34,7 +36,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Run:
-    """A finished search. ``best``: the best feasible evaluation, else the one of least violation.
+    """A finished search. ``best``: the best feasible evaluation, of several objectives the knee of the front,
+    else the one of least violation. ``front``: of several objectives, best first by the first one.
     ``evaluations``: the table of evaluations.csv, in the study's units. ``folder``: None if not written.
     ``verdict``: on the best design, None where the study asks for none or nothing feasible was found."""
 
@@ -44,6 +47,7 @@ class Run:
     result: SearchResult
     folder: Path | None
     verdict: Verdict | None = None
+    front: tuple[Evaluation, ...] = ()
 
 
 def evaluate_design(study: Study, values: Mapping[str, float | str]) -> Evaluation:
@@ -98,7 +102,8 @@ def optimize_study(
             result = _written(study, plan, workers, watch, folder, stored)
     best = None if result.best is None else result.best.evaluation
     table = evaluations_frame(study, result.entries)
-    return Run(best, table, result.status, result, folder, result.verdict)
+    front = tuple(entry.evaluation for entry in result.front)
+    return Run(best, table, result.status, result, folder, result.verdict, front)
 
 
 def _searched(
@@ -106,8 +111,12 @@ def _searched(
 ) -> SearchResult:
     if study.certification is None:
         result = search(study.problem, plan, workers=workers, record=record, stored=stored)
+        return with_bound(study.problem, plan, result)
+    proving = Proving(study.certification.tolerance, study.certification.boxes)
+    if len(study.problem.objectives) > 1:
+        result = search(study.problem, plan, workers=workers, record=record, stored=stored)
+        result = with_proved_knee(study.problem, proving, result, workers=workers)
     else:
-        proving = Proving(study.certification.tolerance, study.certification.boxes)
         result = search_certified(study.problem, plan, proving, workers=workers, record=record, stored=stored)
     return with_bound(study.problem, plan, result)
 
@@ -147,6 +156,7 @@ def _written(
             "budget": plan.budget,
             "workers": workers,
             "remarks": list(result.remarks),
+            **_front_data(study, result),
             **_bound_data(result),
             **({} if study.certification is None else _rounds_data(result)),
             "study_hash": study.study_hash,
@@ -155,8 +165,17 @@ def _written(
             **({} if stored is None else {"resumed_after": len(stored)}),
             "seconds": round(time.perf_counter() - began, 3),
         }
-        writer.finish(result.entries, [result.best] if result.best else [], summary)
+        ended_with = result.front or tuple(filter(None, [result.best]))
+        writer.finish(result.entries, ended_with, summary)
     return result
+
+
+def _front_data(study: Study, result: SearchResult) -> dict[str, Any]:
+    """For run.json: ids of the front's designs, and what each is marked with, if anything."""
+    if len(study.problem.objectives) == 1:
+        return {}
+    marks = front_marks(study.problem, result.front)
+    return {"front": {str(e.number): mark for e, mark in zip(result.front, marks, strict=True)}}
 
 
 def _bound_data(result: SearchResult) -> dict[str, Any]:
