@@ -1,7 +1,9 @@
 """Evolutionary fronts of pymoo (Blank and Deb, IEEE Access 8, 2020, 89497-89509).
 
 pymoo makes populations and is told their values; it evaluates nothing itself. What it changes for the whole
-process (a notice on standard output, the filters of warnings) is undone here.
+process (a notice on standard output, the filters of warnings) is undone here. New members come from differences
+of others, as in differential evolution (Kukkonen and Lampinen, 2005; Li and Zhang, 2009): the front of a 3-URU
+in 6 variables came as near in 4,000 evaluations as with pymoo's own crossover, along the axes, in far more.
 """
 
 from __future__ import annotations
@@ -24,6 +26,15 @@ more often serves it better than a large one."""
 DIRECTIONS = 56
 """Most reference directions of NSGA-III, one for each member of a generation."""
 
+FACTORS = (0.4, 0.9)
+"""Factors on the difference of two members, drawn for each new member."""
+
+EXCHANGED = 0.9
+"""Share of the coordinates that a new member has from the difference, the others from its first parent."""
+
+MUTATED = 0.2
+"""Share of the new members that are mutated besides."""
+
 NO_LIMIT = 10**9
 """The budget belongs to the search; pymoo's own limits on generations and evaluations are lifted."""
 
@@ -31,7 +42,6 @@ NO_LIMIT = 10**9
 def nsga2(watch: Watch, seed: int) -> str:
     """Elitist non-dominated sorting with crowding distance; Deb's rules for constraints."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
-    from pymoo.operators.crossover.sbx import SBX
 
     return _evolve(
         watch,
@@ -40,8 +50,8 @@ def nsga2(watch: Watch, seed: int) -> str:
         NSGA2(
             pop_size=POPULATION,
             sampling=_first_generation(watch, POPULATION, seed),
-            crossover=SBX(eta=15, prob=0.9),
-            mutation=_mutation(watch.levels > 0, eta=20),
+            crossover=_differences(),
+            mutation=_mutation(watch.levels > 0),
             repair=_repair(watch.levels),
         ),
     )
@@ -51,7 +61,6 @@ def nsga3(watch: Watch, seed: int) -> str:
     """Elitist non-dominated sorting along reference directions (Das and Dennis, 1998), as many as there are
     in ``DIRECTIONS``."""
     from pymoo.algorithms.moo.nsga3 import NSGA3
-    from pymoo.operators.crossover.sbx import SBX
     from pymoo.operators.selection.tournament import TournamentSelection
     from pymoo.util.ref_dirs import get_reference_directions
 
@@ -70,8 +79,8 @@ def nsga3(watch: Watch, seed: int) -> str:
             pop_size=size,
             sampling=_first_generation(watch, size, seed),
             selection=TournamentSelection(func_comp=_feasible_first),
-            crossover=SBX(eta=30, prob=1.0),
-            mutation=_mutation(watch.levels > 0, eta=20),
+            crossover=_differences(),
+            mutation=_mutation(watch.levels > 0),
             repair=_repair(watch.levels),
         ),
     )
@@ -146,7 +155,26 @@ def _repair(levels: Any) -> Any:
     return LevelCentres()
 
 
-def _mutation(discrete: Any, eta: float) -> Any:
+def _differences() -> Any:
+    """New members a + F (b − c), halfway to a bound where they would cross it."""
+    from pymoo.core.crossover import Crossover
+
+    class Differences(Crossover):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__(n_parents=3, n_offsprings=1, prob=1.0)
+
+        def _do(self, problem: Any, X: Any, random_state: Any = None, algorithm: Any = None) -> Any:
+            first, second, third = X
+            moved = first + random_state.uniform(*FACTORS, (len(first), 1)) * (second - third)
+            moved = np.where(moved < 0.0, 0.5 * first, np.where(moved > 1.0, 0.5 * (first + 1.0), moved))
+            exchanged = random_state.random(moved.shape) < EXCHANGED
+            exchanged[np.arange(len(first)), random_state.integers(moved.shape[1], size=len(first))] = True
+            return np.where(exchanged, moved, first)[None]
+
+    return Differences()
+
+
+def _mutation(discrete: Any) -> Any:
     """Polynomial mutation; a discrete coordinate is drawn anew instead: steps as small as those of continuous
     ones would not leave its level."""
     from pymoo.operators.mutation.pm import PM
@@ -158,7 +186,7 @@ def _mutation(discrete: Any, eta: float) -> Any:
             drawn = random_state.random(X.shape)
             return np.where(discrete, np.where(chosen, drawn, X), moved)
 
-    return MixedMutation(eta=eta)
+    return MixedMutation(prob=MUTATED, eta=20)
 
 
 _ABILITIES = Abilities(
