@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from tpm_design.cli.comparison import comparison_text, worst_code, write_comparison
-from tpm_design.cli.guard import INTERRUPTED, NOT_PROVED, NOTHING_FEASIBLE
 from tpm_design.cli.front import front_data, front_text
+from tpm_design.cli.guard import INTERRUPTED, NOT_PROVED, NOTHING_FEASIBLE
 from tpm_design.cli.progress import search_progress
 from tpm_design.cli.results import design_rows, evaluation_data, limit_text, result_text
 from tpm_design.cli.text import table

@@ -1,5 +1,5 @@
-"""Fronts by bounds on an objective (Haimes, Lasdon and Wismer, 1971): a ladder of problems with one objective,
-each solved by NLopt's COBYLA. Deterministic."""
+"""Fronts by bounds on an objective (Haimes, Lasdon and Wismer, 1971): a ladder of problems with one
+objective, each solved by NLopt's COBYLA. Deterministic."""
 
 from __future__ import annotations
 
@@ -38,6 +38,9 @@ CLOSE = 0.04
 """Neighbours on the front that are this near, as a share of the range of each objective, need no rung between
 them."""
 
+SAME = 1e-6
+"""Extremes that differ by no more in an objective, in its scale, are one design."""
+
 MET = -1e-7
 """A constraint counts as met up to this: active-set methods end a rounding outside."""
 
@@ -50,7 +53,7 @@ def epsilon_constraint(watch: Watch, seed: int) -> str:
     first = _extreme(known, 0)
     second = _extreme(known, 1)
     width = np.abs(known.objectives(second) - known.objectives(first))
-    if not np.all(width > 0.0):
+    if np.any(width <= SAME):
         return "One design is best in every objective."
     top, bottom = known.objectives(first)[1], known.objectives(second)[1]
     gaps = [_Gap(bottom, second, top, first)]

@@ -72,8 +72,8 @@ def status_text(reported: Reported) -> str:
     if reported.feasible:
         if reported.front:
             return (
-                f"{start}Front of {len(reported.front)} designs from the {count} evaluations in the log; its knee is "
-                f"number {number}."
+                f"{start}Front of {len(reported.front)} designs from the {count} evaluations in the log; "
+                f"its knee is number {number}."
             )
         return f"{start}Best feasible design of the {count} evaluations in the log: number {number}."
     return f"{start}None of the {count} designs in the log is feasible; the closest is number {number}."
@@ -345,7 +345,7 @@ def _caveats(reported: Reported) -> list[str]:
         "only on the unfavourable side of its error.",
         f"- Volumes and averages aim at a relative error of {reported.problem.accuracy.volume:g}; the "
         f"region is sampled at {reported.problem.accuracy.region_samples} poses along its longest edge.",
-        f"- {'The front holds the best of what was' if reported.front else 'The best design is the best one'} "
+        f"- {'The front is the best' if reported.front else 'The best design is the best one'} of what was "
         "evaluated; no claim is made that none is better.",
         "- Axes are taken as exact and links as rigid.",
     ]

@@ -42,8 +42,8 @@ def knee(front: FloatArray) -> int:
     objective as a share of the front's range (Das, Structural Optimization 18, 1999, 107-115).
 
     Where these span no plane that faces the ideal point, the plane of equal weights stands for it. Of equal
-    distances that with the least sum of shares; where the whole front bulges away from the ideal point that is
-    one of the extremes.
+    distances that with the least sum of shares; where the whole front bulges away from the ideal point that
+    is one of the extremes.
     """
     shares = _shares(front)
     normal = np.ones(front.shape[1])

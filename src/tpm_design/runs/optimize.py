@@ -263,7 +263,9 @@ def status_sentence(
         found = f"Best feasible design of {count} evaluations: number {best.number}."
         if len(problem.objectives) > 1:
             front = front_entries(problem, entries)
-            found = f"Front of {len(front)} designs from {count} evaluations; its knee is number {best.number}."
+            found = (
+                f"Front of {len(front)} designs from {count} evaluations; its knee is number {best.number}."
+            )
         return " ".join(filter(None, [detail, remedy, found, *_failures(entries)]))
     limit = binding(problem, best)
     label = limit[0].label if limit else "the objective"

@@ -17,8 +17,8 @@ from tpm_design.errors import UsageError, did_you_mean
 from tpm_design.problem import Design, Evaluation, evaluate, with_ties
 from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run, text_hash
 from tpm_design.runs.lock import sole_writer
-from tpm_design.runs.optimality import gap_of, with_bound
 from tpm_design.runs.marks import front_marks
+from tpm_design.runs.optimality import gap_of, with_bound
 from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, search
 from tpm_design.runs.proved_knee import with_proved_knee
 from tpm_design.runs.rounds import Proving, search_certified
