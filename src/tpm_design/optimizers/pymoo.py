@@ -4,8 +4,8 @@ pymoo makes populations and is told their values; it evaluates nothing itself. W
 process (a notice on standard output, the filters of warnings) is undone here.
 
 New members come from differences of others, as in differential evolution (Kukkonen and Lampinen, 2005; Li and
-Zhang, 2009). pymoo's own crossover works along the axes: 4,000 evaluations of a 3-URU in 6 variables gave links
-of 1487, 1812 and 2276 mm with it for 1/κ of 0.3, 0.5 and 0.6, and 1260, 1761 and 2184 mm by differences.
+Zhang, 2009). pymoo's own crossover works along the axes: 4,000 evaluations of a 3-URU in 6 variables gave
+links of 1487, 1812 and 2276 mm with it for 1/κ of 0.3, 0.5 and 0.6; 1260, 1761 and 2184 mm by differences.
 """
 
 from __future__ import annotations

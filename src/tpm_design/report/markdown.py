@@ -345,7 +345,7 @@ def _caveats(reported: Reported) -> list[str]:
         "only on the unfavourable side of its error.",
         f"- Volumes and averages aim at a relative error of {reported.problem.accuracy.volume:g}; the "
         f"region is sampled at {reported.problem.accuracy.region_samples} poses along its longest edge.",
-        f"- {'The front is the best' if reported.front else 'The best design is the best one'} of what was "
+        f"- The {'front holds the best designs' if reported.front else 'best design is the best one'} "
         "evaluated; no claim is made that none is better.",
         "- Axes are taken as exact and links as rigid.",
     ]

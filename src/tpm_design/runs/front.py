@@ -46,11 +46,12 @@ def knee(front: FloatArray) -> int:
     is one of the extremes.
     """
     shares = _shares(front)
-    normal = np.ones(front.shape[1])
+    normal: FloatArray = np.ones(front.shape[1])
     corners = shares[extremes(front)]
     if np.linalg.cond(corners) < 1e8:
-        solved = np.linalg.solve(corners, normal)
-        normal = solved if np.all(solved > 0.0) else normal
+        solved = np.asarray(np.linalg.solve(corners, normal), dtype=np.float64)
+        if np.all(solved > 0.0):
+            normal = solved
     # rounded, so that which of equal ones is chosen does not hang on the last digit
     distance = np.round((1.0 - shares @ normal) / np.linalg.norm(normal), 12)
     return int(np.lexsort((shares.sum(axis=1), -distance))[0])
@@ -59,8 +60,9 @@ def knee(front: FloatArray) -> int:
 def _shares(front: FloatArray) -> FloatArray:
     """Each column from 0 to 1 over the front; 0 where it has no range."""
     least = front.min(axis=0)
-    width = np.ptp(front, axis=0)
-    return (front - least) / np.where(width > 0.0, width, 1.0)
+    width = front.max(axis=0) - least
+    shares: FloatArray = (front - least) / np.where(width > 0.0, width, 1.0)
+    return shares
 
 
 @dataclass(frozen=True)
