@@ -32,7 +32,7 @@ STUDY, TABLE, LOG, DESIGNS, SUMMARY = (
 UNFINISHED = "unfinished"
 """``ending`` in run.json from the start of a run until it is over."""
 
-LIBRARIES = ("tpm-design", "numpy", "scipy", "numba", "nlopt", "pandas")
+LIBRARIES = ("tpm-design", "numpy", "scipy", "numba", "nlopt", "pymoo", "pandas")
 
 
 def create_run_folder(results: Path, study_name: str, study_hash: str) -> Path:

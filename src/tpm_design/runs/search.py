@@ -28,6 +28,7 @@ from tpm_design.problem import (
     scaled_objective,
 )
 from tpm_design.runs.executors import Executor, Threads, in_order
+from tpm_design.runs.front import knee, non_dominated
 from tpm_design.synthesis.bound import relaxed_designs
 
 FloatArray = NDArray[np.float64]
@@ -183,6 +184,10 @@ class UnitSearch:
     def constraint_count(self) -> int:
         return sum(self.sizes)
 
+    @property
+    def objective_count(self) -> int:
+        return len(self.log.problem.objectives)
+
     def evaluate(self, points: FloatArray) -> Outcomes:
         """Values at ``points`` (N, n). Raises BudgetSpent."""
         table = np.atleast_2d(np.asarray(points, dtype=np.float64))
@@ -247,8 +252,13 @@ def cutoff_at(problem: Problem, results: Sequence[Evaluation], keep: int) -> Cut
 
 
 def best_entry(problem: Problem, entries: Iterable[Entry]) -> Entry | None:
-    """The feasible entry of least objective in the last round that has one, else the one of least violation;
-    None if there is none."""
+    """The feasible entry of least objective in the last round that has one, of several objectives the knee of
+    the front; else the one of least violation. None if there is none."""
+    if len(problem.objectives) > 1:
+        entries = tuple(entries)
+        front = front_entries(problem, entries)
+        if front:
+            return front[knee(np.array([scaled_objectives(problem, e.evaluation) for e in front]))]
 
     def key(entry: Entry) -> tuple[int, tuple[float, float, int]]:
         feasible = entry.evaluation.status == "feasible"
@@ -260,6 +270,16 @@ def best_entry(problem: Problem, entries: Iterable[Entry]) -> Entry | None:
 def answer_key(entry: Entry) -> AnswerKey:
     """What an entry answers."""
     return entry.judged_by, design_key(entry.evaluation.design), entry.evaluation.cutoff
+
+
+def front_entries(problem: Problem, entries: Iterable[Entry]) -> list[Entry]:
+    """The feasible entries that no other one betters in all objectives, best first by the first objective. Of
+    entries that are equal in all of them the first."""
+    feasible = [entry for entry in entries if entry.evaluation.status == "feasible"]
+    if not feasible:
+        return []
+    values = np.array([scaled_objectives(problem, entry.evaluation) for entry in feasible])
+    return [feasible[row] for row in non_dominated(values)]
 
 
 def design_key(design: Design) -> Key:
@@ -277,7 +297,15 @@ def samples_digest(samples: Sequence[Sample]) -> str:
 
 def minimised(problem: Problem, evaluation: Evaluation) -> float:
     """The first objective over its scale, turned so that less is better; FAILED where there is none."""
-    goal = problem.objectives[0]
+    return scaled_objectives(problem, evaluation)[0]
+
+
+def scaled_objectives(problem: Problem, evaluation: Evaluation) -> tuple[float, ...]:
+    """Every objective over its scale, turned so that less is better; FAILED where there is none."""
+    return tuple(_minimised(goal, evaluation) for goal in problem.objectives)
+
+
+def _minimised(goal: Goal, evaluation: Evaluation) -> float:
     value = evaluation.metrics.get(goal.label, math.nan)
     if not math.isfinite(value):
         return FAILED
@@ -288,7 +316,9 @@ def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[in
     """What an optimiser gets to see, finite everywhere. ``sizes``: number of pieces of each constraint; a
     constraint of fewer pieces repeats its least. Of aborted evaluations constraints that were not measured
     are 0, and the merit is behind that of the cutoff."""
-    objective = np.array([minimised(problem, result) for result in results])
+    objectives = np.array([scaled_objectives(problem, result) for result in results])
+    objectives = objectives.reshape(len(results), len(problem.objectives))
+    objective = objectives[:, 0]
     constraints = np.array(
         [
             [
@@ -304,7 +334,7 @@ def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[in
     )
     aborted = np.array([result.cutoff is not None for result in results], dtype=np.bool_)
     merit = np.where(aborted, FAILED, objective) + PENALTY * violation
-    return Outcomes(objective, constraints, merit, aborted)
+    return Outcomes(objective, constraints, merit, aborted, objectives)
 
 
 def _pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:
