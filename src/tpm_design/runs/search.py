@@ -334,7 +334,7 @@ def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[in
     )
     aborted = np.array([result.cutoff is not None for result in results], dtype=np.bool_)
     merit = np.where(aborted, FAILED, objective) + PENALTY * violation
-    return Outcomes(objective, constraints, merit, aborted, objectives)
+    return Outcomes(objective, constraints, merit, objectives=objectives, aborted=aborted)
 
 
 def _pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:
