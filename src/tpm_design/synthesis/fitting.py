@@ -22,33 +22,80 @@ from tpm_design.synthesis.growth import Grown
 
 FloatArray = NDArray[np.float64]
 
-MOST_EXCHANGES = 30
-# of the size: by how much one program may move or resize the body
+MOST_EXCHANGES = 60
+MOST_CONTACTS = 120
+# of the size: by how much one program may move or resize the body at most
 STRIDE = 0.25
-# of the size: contacts that are so little beyond a bound, and changes so small, end the exchange
-CLOSE = 1e-9
+# of a move: a body of which a larger share is beyond a bound shows that moves are too long
+ASTRAY = 0.05
+# of the size: moves so small end the exchange, and so do programs that gain no larger share of the volume
+CLOSE, GAIN, MOST_IDLE = 1e-9, 1e-9, 6
+# of the size: a contact so little beyond a bound is on it
+TOUCHING = 1e-12
+MOST_SHRINKINGS = 12
 # of the half sizes, from a contact to where other bounds that meet there are looked for: far enough to give
 # them contacts of their own, and so near that their planes touch the body
 ASIDE, CLOSE_BY = 2e-3, 1e-5
 
 
-def fitted(form: BodyForm, start: Grown) -> Grown:
-    """The body at a local optimum, up to ``CLOSE`` within the free set."""
-    body = start
-    known: Contacts | None = None
-    for _ in range(MOST_EXCHANGES):
-        fresh = contacts(form, body.free, body.centre, body.sizes, aside=ASIDE)
-        if known is not None:
-            again = contacts_at(form, body.free, body.centre, body.sizes, known.unit, known.bound)
-            fresh = fresh.joined(again).distinct()
-        known = fresh
-        following = _solved(form, body, known)
-        size = float(form.half(body.sizes).max())
-        moved = np.abs(np.append(following.centre - body.centre, following.sizes - body.sizes)).max()
-        body = following
-        if moved <= CLOSE * size and float(known.distance.min(initial=0.0)) >= -CLOSE * size:
+def fitted(form: BodyForm, start: Grown) -> Grown | None:
+    """The body at a local optimum, all of it in the free set as far as its contacts tell; None where nothing
+    of it is."""
+    best, known, _ = _shrunk(form, start, None)
+    stride, idle = STRIDE, 0
+    for _ in range(MOST_EXCHANGES if best is not None else 0):
+        size, volume = float(form.half(best.sizes).max()), form.volume(best.sizes)
+        trial = _solved(form, best, known, stride)
+        moved = float(np.abs(np.append(trial.centre - best.centre, trial.sizes - best.sizes)).max())
+        inside, fresh, share = _shrunk(form, trial, known)
+        if moved <= CLOSE * size or stride <= CLOSE or idle >= MOST_IDLE:
             break
-    return body
+        gained = 0.0 if inside is None else form.volume(inside.sizes) / volume - 1.0
+        idle = 0 if gained > GAIN else idle + 1
+        if gained > 0.0 and moved > 0.5 * stride * size:
+            stride = min(STRIDE, 2.0 * stride)
+        elif gained <= 0.0 and (1.0 - share > ASTRAY * moved / size or idle > 1):
+            stride = 0.5 * min(stride, moved / size)
+        if inside is not None and gained > 0.0:
+            best = inside
+        # what any body on the way came near to must hold for every other
+        known = contacts_at(form, best.free, best.centre, best.sizes, fresh.unit, fresh.bound).distinct()
+        known = known.chosen(np.argsort(known.distance, kind="stable")[:MOST_CONTACTS])
+    return best
+
+
+def _shrunk(form: BodyForm, body: Grown, known: Contacts | None) -> tuple[Grown | None, Contacts, float]:
+    """The body shrunk about its centre until no contact, ``known`` ones included, is beyond its bound and no
+    fold inside, None where that takes too much; all contacts on the way; and the share of its size that fits to first order."""
+    every, first = known, 1.0
+    for number in range(MOST_SHRINKINGS):
+        found = contacts(form, body.free, body.centre, body.sizes, aside=ASIDE)
+        if every is not None:
+            again = contacts_at(form, body.free, body.centre, body.sizes, every.unit, every.bound)
+            found = found.joined(again)
+        every = found
+        share = _share_inside(form, body, found)
+        first = share if number == 0 else first
+        if share >= 1.0:
+            return body, every, first
+        # to first order: a little more, so that it comes to an end
+        body = replace(body, sizes=max(0.7, 1.0 - 1.1 * (1.0 - share)) * body.sizes)
+    assert every is not None
+    return None, every, first
+
+
+def _share_inside(form: BodyForm, body: Grown, found: Contacts) -> float:
+    """By which share the body must be shrunk about its centre, to first order, to be in the free set."""
+    half = form.half(body.sizes)
+    shares = [1.0]
+    extents = np.einsum("kj,kj->k", found.normal, half * found.unit)
+    short = np.flatnonzero(found.distance < -TOUCHING * float(half.max()))
+    shares += [float(found.distance[k] / extents[k]) + 1.0 if extents[k] > 0.0 else 0.0 for k in short]
+    for line in body.free.lines:
+        plane = fold_plane(form, body.centre, body.sizes, line)
+        if plane.room < -TOUCHING * float(half.max()):
+            shares.append(1.0 + plane.room / float(form.extents(plane.normal[None], body.sizes)[0]))
+    return min(shares)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,15 +153,15 @@ class _Program:
         return (np.array(up) - np.array(down)) / (2.0 * step)
 
 
-def _solved(form: BodyForm, body: Grown, known: Contacts) -> Grown:
+def _solved(form: BodyForm, body: Grown, known: Contacts, stride: float) -> Grown:
     from scipy.optimize import minimize
 
     program = _Program(form, body, known)
     x = np.append(body.centre, body.sizes) / program.length
     half = form.half(x[3:])
-    move = STRIDE * float(half.max())
+    move = stride * float(half.max())
     bounds = [(value - move, value + move) for value in x[:3]]
-    bounds += [(value * (1.0 - STRIDE), value * (1.0 + STRIDE)) for value in x[3:]]
+    bounds += [(value * (1.0 - stride), value * (1.0 + stride)) for value in x[3:]]
     rules: Any = {"type": "ineq", "fun": program.room, "jac": program.room_slope}
     found: Any = minimize(
         program.cost,

@@ -75,7 +75,7 @@ class FreeSet:
         bounds are equal."""
         step = STEP * self.length
         moved = poses[None] + step * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])[:, None]
-        values = self.margins(moved.reshape(-1, 3)).reshape(-1, 7, len(poses))
+        values = self.margins(moved.reshape(-1, 3)).reshape(1 + len(self.sides), 7, len(poses))
         slopes = (values[:, 1:4] - values[:, 4:]) / (2.0 * step)
         bends = np.abs(values[:, 1:4] + values[:, 4:] - 2.0 * values[:, :1]).max(axis=1) / step
         smooth = bends <= KINK * np.linalg.norm(slopes, axis=1)

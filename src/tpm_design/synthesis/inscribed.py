@@ -99,7 +99,8 @@ def largest_body(
     found = [grown(form, seed) for seed in seeds(mechanism, mode, margin, wanted)]
     best: InscribedBody | None = None
     for start in _worth_fitting(form, [one for one in found if one is not None]):
-        inside = _within(form, fitted(form, start))
+        fit = fitted(form, start)
+        inside = None if fit is None else _within(form, fit)
         if inside is not None and (best is None or inside.volume > best.volume):
             best = inside
     return best
