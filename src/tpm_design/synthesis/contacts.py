@@ -16,7 +16,6 @@ from tpm_design.workspace.sampling import lattice
 
 FloatArray = NDArray[np.float64]
 
-SAMPLES = 9
 # of each bound, the nearest ones
 MOST_OF_A_BOUND = 24
 # of the body's size: what is deeper inside touches nothing soon
@@ -79,15 +78,16 @@ def contacts_at(
 
 
 def contacts(
-    form: BodyForm, free: FreeSet, centre: FloatArray, sizes: FloatArray, *, aside: float
+    form: BodyForm, free: FreeSet, centre: FloatArray, sizes: FloatArray, *, aside: float, samples: int
 ) -> Contacts:
     """The local minima of every margin over the body: of a lattice, polished, and points beside them where
-    several bounds meet, a share ``aside`` of the half sizes away."""
+    several bounds meet, a share ``aside`` of the half sizes away. ``samples``: lattice poses along the longest
+    side."""
     region, half = form.region(centre, sizes), form.half(sizes)
-    grid = lattice(region, SAMPLES)
+    grid = lattice(region, samples)
     poses = np.ascontiguousarray(grid.reshape(-1, 3))
     margins = free.margins(poses)
-    spacing = 2.0 * float(half.max()) / (SAMPLES - 1)
+    spacing = 2.0 * float(half.max()) / (samples - 1)
     units, bounds = [], []
     for number, index in enumerate(free.indices):
         lowest = _local_minima(margins[number].reshape(grid.shape[:3]))

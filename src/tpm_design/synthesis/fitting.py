@@ -33,6 +33,9 @@ CLOSE, GAIN, MOST_IDLE = 1e-9, 1e-9, 6
 # of the size: a contact so little beyond a bound is on it
 TOUCHING = 1e-12
 MOST_SHRINKINGS = 12
+# lattice poses along the longest side: in each exchange, and of the finer looks at what comes of them
+COARSE, FINE = 9, 25
+MOST_LOOKS = 5
 # of the half sizes, from a contact to where other bounds that meet there are looked for: far enough to give
 # them contacts of their own, and so near that their planes touch the body
 ASIDE, CLOSE_BY = 2e-3, 1e-5
@@ -41,13 +44,30 @@ ASIDE, CLOSE_BY = 2e-3, 1e-5
 def fitted(form: BodyForm, start: Grown) -> Grown | None:
     """The body at a local optimum, all of it in the free set as far as its contacts tell; None where nothing
     of it is."""
-    best, known, _ = _shrunk(form, start, None)
+    best, known = start, None
+    for _ in range(MOST_LOOKS):
+        found, known = _exchanged(form, best, known)
+        if found is None:
+            return None
+        # a finer look may find what the contacts so far have missed
+        inside, seen, share = _shrunk(form, found, known, FINE)
+        if inside is None:
+            return None
+        if share >= 1.0 - CLOSE:
+            return inside
+        best, known = inside, _nearest(form, inside, seen)
+    return best
+
+
+def _exchanged(form: BodyForm, start: Grown, known: Contacts | None) -> tuple[Grown | None, Contacts]:
+    """The body at a local optimum with respect to its contacts on a coarse lattice and ``known`` ones."""
+    best, known, _ = _shrunk(form, start, known, COARSE)
     stride, idle = STRIDE, 0
     for _ in range(MOST_EXCHANGES if best is not None else 0):
         size, volume = float(form.half(best.sizes).max()), form.volume(best.sizes)
         trial = _solved(form, best, known, stride)
         moved = float(np.abs(np.append(trial.centre - best.centre, trial.sizes - best.sizes)).max())
-        inside, fresh, share = _shrunk(form, trial, known)
+        inside, fresh, share = _shrunk(form, trial, known, COARSE)
         if moved <= CLOSE * size or stride <= CLOSE or idle >= MOST_IDLE:
             break
         gained = 0.0 if inside is None else form.volume(inside.sizes) / volume - 1.0
@@ -59,17 +79,24 @@ def fitted(form: BodyForm, start: Grown) -> Grown | None:
         if inside is not None and gained > 0.0:
             best = inside
         # what any body on the way came near to must hold for every other
-        known = contacts_at(form, best.free, best.centre, best.sizes, fresh.unit, fresh.bound).distinct()
-        known = known.chosen(np.argsort(known.distance, kind="stable")[:MOST_CONTACTS])
-    return best
+        known = _nearest(form, best, fresh)
+    return best, known
 
 
-def _shrunk(form: BodyForm, body: Grown, known: Contacts | None) -> tuple[Grown | None, Contacts, float]:
+def _nearest(form: BodyForm, body: Grown, found: Contacts) -> Contacts:
+    """Contacts of other bodies seen from this one: the nearest of those that differ."""
+    here = contacts_at(form, body.free, body.centre, body.sizes, found.unit, found.bound).distinct()
+    return here.chosen(np.argsort(here.distance, kind="stable")[:MOST_CONTACTS])
+
+
+def _shrunk(
+    form: BodyForm, body: Grown, known: Contacts | None, samples: int
+) -> tuple[Grown | None, Contacts, float]:
     """The body shrunk about its centre until no contact, ``known`` ones included, is beyond its bound and no
     fold inside, None where that takes too much; all contacts on the way; and the share of its size that fits to first order."""
     every, first = known, 1.0
     for number in range(MOST_SHRINKINGS):
-        found = contacts(form, body.free, body.centre, body.sizes, aside=ASIDE)
+        found = contacts(form, body.free, body.centre, body.sizes, aside=ASIDE, samples=samples)
         if every is not None:
             again = contacts_at(form, body.free, body.centre, body.sizes, every.unit, every.bound)
             found = found.joined(again)
@@ -178,7 +205,7 @@ def _solved(form: BodyForm, body: Grown, known: Contacts, stride: float) -> Grow
 def upper_volume(form: BodyForm, body: Grown) -> float | None:
     """The volume (m³) of the largest body between the planes that touch the free set at this one's contacts:
     its own at a local optimum. None where they do not bound it."""
-    near = contacts(form, body.free, body.centre, body.sizes, aside=CLOSE_BY)
+    near = contacts(form, body.free, body.centre, body.sizes, aside=CLOSE_BY, samples=FINE)
     near = near.chosen(near.distance <= 4.0 * CLOSE_BY * float(form.half(body.sizes).max()))
     folds = [fold_plane(form, body.centre, body.sizes, line) for line in body.free.lines]
     half = form.half(body.sizes)

@@ -72,13 +72,15 @@ class FreeSet:
 
     def slopes(self, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
         """``margins`` and their gradients (1 + D, N, 3) by central differences, NaN at a kink, where two
-        bounds are equal."""
+        bounds of reach are equal."""
         step = STEP * self.length
         moved = poses[None] + step * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])[:, None]
         values = self.margins(moved.reshape(-1, 3)).reshape(1 + len(self.sides), 7, len(poses))
         slopes = (values[:, 1:4] - values[:, 4:]) / (2.0 * step)
         bends = np.abs(values[:, 1:4] + values[:, 4:] - 2.0 * values[:, :1]).max(axis=1) / step
         smooth = bends <= KINK * np.linalg.norm(slopes, axis=1)
+        # determinants have no kinks, but roots, which fall to 0 where limbs are stretched
+        smooth[1:] = True
         slopes = np.where(smooth[:, None], slopes, math.nan)
         return values[:, 0], np.moveaxis(slopes, 1, 2)
 

@@ -20,14 +20,16 @@ from tpm_design.workspace.regions import Shape
 
 FloatArray = NDArray[np.float64]
 
-REGION_SAMPLES = 17
+REGION_SAMPLES = 25
 MOST_FITTED = 4
 # grown bodies of a smaller share of the largest one's volume are not fitted, nor those as near to another
 WORTH_FITTING, SAME = 0.6, 0.05
 # digits after which lengths are cut off, counted from the first of the mechanism's reach
 DIGITS = 9
 # shares of the sizes by which a body is shrunk until every margin holds, or grown until one is broken
-STEPS = tuple(10.0**power for power in np.arange(-10.0, -0.4, 0.5))
+STEPS = tuple(10.0 ** (0.5 * power) for power in range(-20, 0))
+# a larger step is halved so often, towards the one before
+COARSEST, HALVINGS = 1e-6, 5
 
 
 @dataclass(frozen=True)
@@ -124,17 +126,38 @@ def _worth_fitting(form: BodyForm, bodies: Sequence[Grown]) -> list[Grown]:
 
 
 def _within(form: BodyForm, body: Grown) -> InscribedBody | None:
-    """The body shrunk by the least step with which it passes the check, its lengths cut to round numbers."""
-    for step in (0.0, *STEPS):
-        centre, sizes = _cut(body, (1.0 - step) * body.sizes)
-        found = margins_over(form, body.free, centre, sizes)
-        if found is not None and all(one.value - one.error >= one.asked for one in found.values()):
-            inside = Grown(body.free, centre, sizes)
-            x, y, z = centre.tolist()
-            return InscribedBody(
-                form, body.free, (x, y, z), sizes, found, _growths(form, inside), _gap(form, inside)
-            )
-    return None
+    """The body shrunk by about the least share with which it passes the check, its lengths cut to round
+    numbers."""
+    low = high = 0.0
+    passed = _passed(form, body, high)
+    for step in STEPS:
+        if passed is not None:
+            break
+        low, high = high, step
+        passed = _passed(form, body, high)
+    if passed is None:
+        return None
+    for _ in range(HALVINGS if high > COARSEST else 0):
+        middle = 0.5 * (low + high)
+        smaller = _passed(form, body, middle)
+        low, high, passed = (middle, high, passed) if smaller is None else (low, middle, smaller)
+    (centre, sizes), margins = passed
+    upper = upper_volume(form, body)
+    gap = None if upper is None else max(0.0, upper / form.volume(sizes) - 1.0)
+    growths = _growths(form, Grown(body.free, centre, sizes))
+    x, y, z = centre.tolist()
+    return InscribedBody(form, body.free, (x, y, z), sizes, margins, growths, gap)
+
+
+def _passed(
+    form: BodyForm, body: Grown, share: float
+) -> tuple[tuple[FloatArray, FloatArray], dict[str, Margin]] | None:
+    """The body with its sizes less by a share, and its margins, if all of them hold."""
+    placed = _cut(body, (1.0 - share) * body.sizes)
+    found = margins_over(form, body.free, *placed)
+    if found is None or any(one.value - one.error < one.asked for one in found.values()):
+        return None
+    return placed, found
 
 
 def _cut(body: Grown, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -173,8 +196,3 @@ def _growth(form: BodyForm, body: Grown, number: int) -> float:
         if found is None or any(one.value < one.asked for one in found.values()):
             return step
     return 1.0
-
-
-def _gap(form: BodyForm, body: Grown) -> float | None:
-    upper = upper_volume(form, body)
-    return None if upper is None else max(0.0, upper / form.volume(body.sizes) - 1.0)
