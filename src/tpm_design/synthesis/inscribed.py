@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,6 +158,15 @@ def _passed(
     if found is None or any(one.value - one.error < one.asked for one in found.values()):
         return None
     return placed, found
+
+
+def shrunk(body: InscribedBody, share: float) -> InscribedBody:
+    """The body with its sizes less by a share, about the same centre."""
+    whole = Grown(body.free, np.asarray(body.centre), body.sizes)
+    centre, sizes = _cut(whole, (1.0 - share) * body.sizes)
+    found = margins_over(body.form, body.free, centre, sizes)
+    growths = tuple(min(1.0, growth + share / (1.0 - share)) for growth in body.growths)
+    return replace(body, sizes=sizes, margins=found or body.margins, growths=growths)
 
 
 def _cut(body: Grown, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
