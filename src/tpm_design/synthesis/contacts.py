@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,20 +21,42 @@ MOST_OF_A_BOUND = 24
 # of the body's size: what is deeper inside touches nothing soon
 DEEP = 0.3
 # rows of a Jacobian closer than this are one contact
-ALIKE = 1e-4
+ALIKE, ALIKE_WALLS = 1e-4, 1e-7
+# of the unit body, from its surface: what is deeper lies inside
+INSIDE = 1e-6
+BISECTIONS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """Planes ``normals`` (W, 3) · x ≤ ``offsets`` (W,), in front of parts of a bound that lie inside a body."""
+
+    normals: FloatArray
+    offsets: FloatArray
+
+    def joined(self, other: Walls) -> Walls:
+        return Walls(np.vstack([self.normals, other.normals]), np.append(self.offsets, other.offsets))
+
+    def rooms(self, form: BodyForm, centre: FloatArray, sizes: FloatArray) -> FloatArray:
+        """What the body keeps from each (m), negative where the plane cuts it."""
+        return np.asarray(self.offsets - self.normals @ centre - form.extents(self.normals, sizes))
+
+
+NO_WALLS = Walls(np.zeros((0, 3)), np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
     """Contacts of a body. ``unit`` (K, 3): its point, of the unit body; ``bound`` (K,): number of the margin;
     ``distance`` (K,): metres to the bound, to first order, negative beyond it; ``normal`` (K, 3): outward,
-    ``steepness`` (K,): of the margin."""
+    ``steepness`` (K,): of the margin. ``walls``: instead of contacts with what lies inside the body."""
 
     unit: FloatArray
     bound: NDArray[np.int64]
     distance: FloatArray
     normal: FloatArray
     steepness: FloatArray
+    walls: Walls = NO_WALLS
 
     def joined(self, other: Contacts) -> Contacts:
         return Contacts(
@@ -43,6 +65,7 @@ class Contacts:
             np.append(self.distance, other.distance),
             np.vstack([self.normal, other.normal]),
             np.append(self.steepness, other.steepness),
+            self.walls.joined(other.walls),
         )
 
     def chosen(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Contacts:
@@ -52,6 +75,7 @@ class Contacts:
             self.distance[which],
             self.normal[which],
             self.steepness[which],
+            self.walls,
         )
 
     def distinct(self) -> Contacts:
@@ -59,7 +83,18 @@ class Contacts:
         rows = np.column_stack([self.bound, self.normal, self.unit * self.normal, self.distance])
         order = np.argsort(self.distance, kind="stable")
         _, first = np.unique(np.round(rows[order] / ALIKE), axis=0, return_index=True)
-        return self.chosen(order[np.sort(first)])
+        planes = np.column_stack([self.walls.normals, self.walls.offsets])
+        _, one = np.unique(np.round(planes / ALIKE_WALLS), axis=0, return_index=True)
+        walls = Walls(self.walls.normals[one], self.walls.offsets[one])
+        return replace(self.chosen(order[np.sort(first)]), walls=walls)
+
+
+def seen_from(
+    form: BodyForm, free: FreeSet, centre: FloatArray, sizes: FloatArray, others: Contacts
+) -> Contacts:
+    """The contacts of another body for this one: the same points of the unit body, the same walls."""
+    here = contacts_at(form, free, centre, sizes, others.unit, others.bound)
+    return replace(here, walls=others.walls)
 
 
 def contacts_at(
@@ -100,13 +135,49 @@ def contacts(
             units.append((np.asarray(found.pose) - centre) / half)
             bounds.append(number)
     unit, bound = np.array(units).reshape(-1, 3), np.array(bounds, dtype=np.int64)
+    enclosed, walls = _walls(form, free, centre, sizes, unit, bound)
+    unit, bound = unit[~enclosed], bound[~enclosed]
     beside = aside * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
     around = centre + half * (unit[:, None] + beside).reshape(-1, 3)
     inside = np.array([nearest_pose(region, (x, y, z)) for x, y, z in around.tolist()]).reshape(-1, 3)
     every = contacts_at(
         form, free, centre, sizes, (inside - centre) / half, np.repeat(bound, len(beside))
     )
-    return every.chosen(every.distance <= DEEP * float(half.max())).distinct()
+    near = every.chosen(every.distance <= DEEP * float(half.max()))
+    return replace(near, walls=walls).distinct()
+
+
+def _walls(
+    form: BodyForm,
+    free: FreeSet,
+    centre: FloatArray,
+    sizes: FloatArray,
+    unit: FloatArray,
+    bound: NDArray[np.int64],
+) -> tuple[NDArray[np.bool_], Walls]:
+    """Which minima lie inside the body and beyond their bound, and the walls in front of them: there a bound
+    may be met from both sides, as where a determinant touches 0 without a change of sign, and has no slope
+    at the minimum itself."""
+    poses, pick = centre + form.half(sizes) * unit, np.arange(len(bound))
+    depth = form.gauge(poses - centre, sizes)
+    enclosed = (free.margins(poses)[bound, pick] < 0.0) & (depth < 1.0 - INSIDE)
+    if not enclosed.any() or not free.holds(centre):
+        return np.zeros(len(bound), dtype=np.bool_), NO_WALLS
+    ways, bounds, row = poses[enclosed] - centre, bound[enclosed], np.arange(int(enclosed.sum()))
+    low, high = np.zeros(row.size), np.ones(row.size)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        inside = free.margins(centre + middle[:, None] * ways)[bounds, row] >= 0.0
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    there = centre + low[:, None] * ways
+    slopes = free.slopes(there)[1][bounds, row]
+    steepness = np.linalg.norm(slopes, axis=1, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        normals = -slopes / steepness
+    # without a slope, and where it points back: across the way there
+    lost = ~np.isfinite(normals).all(axis=1) | (np.einsum("wj,wj->w", normals, ways) <= 0.0)
+    normals[lost] = (ways / np.linalg.norm(ways, axis=1, keepdims=True))[lost]
+    return enclosed, Walls(normals, np.einsum("wj,wj->w", normals, there))
 
 
 def _unlike(

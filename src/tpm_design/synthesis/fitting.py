@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tpm_design.optimizers.polytope import largest_between
 from tpm_design.synthesis.body_forms import BodyForm
-from tpm_design.synthesis.contacts import Contacts, contacts, contacts_at
+from tpm_design.synthesis.contacts import Contacts, Walls, contacts, seen_from
 from tpm_design.synthesis.fold_planes import fold_plane
 from tpm_design.synthesis.growth import Grown
 
@@ -85,7 +85,7 @@ def _exchanged(form: BodyForm, start: Grown, known: Contacts | None) -> tuple[Gr
 
 def _nearest(form: BodyForm, body: Grown, found: Contacts) -> Contacts:
     """Contacts of other bodies seen from this one: the nearest of those that differ."""
-    here = contacts_at(form, body.free, body.centre, body.sizes, found.unit, found.bound).distinct()
+    here = seen_from(form, body.free, body.centre, body.sizes, found).distinct()
     return here.chosen(np.argsort(here.distance, kind="stable")[:MOST_CONTACTS])
 
 
@@ -98,8 +98,7 @@ def _shrunk(
     for number in range(MOST_SHRINKINGS):
         found = contacts(form, body.free, body.centre, body.sizes, aside=ASIDE, samples=samples)
         if every is not None:
-            again = contacts_at(form, body.free, body.centre, body.sizes, every.unit, every.bound)
-            found = found.joined(again)
+            found = found.joined(seen_from(form, body.free, body.centre, body.sizes, every))
         every = found
         share = _share_inside(form, body, found)
         first = share if number == 0 else first
@@ -118,11 +117,18 @@ def _share_inside(form: BodyForm, body: Grown, found: Contacts) -> float:
     extents = np.einsum("kj,kj->k", found.normal, half * found.unit)
     short = np.flatnonzero(found.distance < -TOUCHING * float(half.max()))
     shares += [float(found.distance[k] / extents[k]) + 1.0 if extents[k] > 0.0 else 0.0 for k in short]
-    for line in body.free.lines:
-        plane = fold_plane(form, body.centre, body.sizes, line)
-        if plane.room < -TOUCHING * float(half.max()):
-            shares.append(1.0 + plane.room / float(form.extents(plane.normal[None], body.sizes)[0]))
+    planes = _planes(form, body, found)
+    rooms = planes.rooms(form, body.centre, body.sizes)
+    cut = rooms < -TOUCHING * float(half.max())
+    shares += (1.0 + rooms[cut] / form.extents(planes.normals[cut], body.sizes)).tolist()
     return min(shares)
+
+
+def _planes(form: BodyForm, body: Grown, found: Contacts) -> Walls:
+    """What no part of the body may be beyond: walls, and the planes in front of folds."""
+    folds = [fold_plane(form, body.centre, body.sizes, line) for line in body.free.lines]
+    normals = np.array([fold.normal for fold in folds]).reshape(-1, 3)
+    return found.walls.joined(Walls(normals, np.array([fold.offset for fold in folds])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,8 +157,8 @@ class _Program:
         body = self.body_at(x)
         pick = np.arange(len(self.contacts.bound))
         values = body.free.margins(self._poses(body))[self.contacts.bound, pick] / self.contacts.steepness
-        folds = [fold_plane(self.form, body.centre, body.sizes, line).room for line in body.free.lines]
-        return np.append(values, folds) / self.length
+        planes = _planes(self.form, body, self.contacts)
+        return np.append(values, planes.rooms(self.form, body.centre, body.sizes)) / self.length
 
     def room_slope(self, x: FloatArray) -> FloatArray:
         body = self.body_at(x)
@@ -161,23 +167,22 @@ class _Program:
         normals = slopes[self.contacts.bound, pick] / self.contacts.steepness[:, None]
         # on a kink the slope beside it, from where the program started
         normals = np.where(np.isfinite(normals), normals, -self.contacts.normal)
-        rows = [np.hstack([normals, (normals * self.contacts.unit) @ self.form.spread])]
-        for line in body.free.lines:
-            normal = fold_plane(self.form, body.centre, body.sizes, line).normal
-            rows.append(np.append(-normal, -self._extent_slope(normal, body))[None])
-        return np.vstack(rows)
+        rows = np.hstack([normals, (normals * self.contacts.unit) @ self.form.spread])
+        planes = _planes(self.form, body, self.contacts).normals
+        return np.vstack([rows, -np.hstack([planes, self._extent_slopes(planes, body)])])
 
     def _poses(self, body: Grown) -> FloatArray:
         return body.centre + self.form.half(body.sizes) * self.contacts.unit
 
-    def _extent_slope(self, normal: FloatArray, body: Grown) -> FloatArray:
-        """Of the body's extent along a normal, by its sizes. Extents are homogeneous and exact differences
-        of them smooth enough."""
+    def _extent_slopes(self, normals: FloatArray, body: Grown) -> FloatArray:
+        """Of the body's extents along normals (W, 3), by its sizes: (W, k)."""
         step = 1e-6 * float(body.sizes.max())
-        count = body.sizes.size
-        up = [self.form.extents(normal[None], body.sizes + step * unit)[0] for unit in np.eye(count)]
-        down = [self.form.extents(normal[None], body.sizes - step * unit)[0] for unit in np.eye(count)]
-        return (np.array(up) - np.array(down)) / (2.0 * step)
+        columns = [
+            self.form.extents(normals, body.sizes + step * unit)
+            - self.form.extents(normals, body.sizes - step * unit)
+            for unit in np.eye(body.sizes.size)
+        ]
+        return np.column_stack(columns) / (2.0 * step)
 
 
 def _solved(form: BodyForm, body: Grown, known: Contacts, stride: float) -> Grown:
@@ -207,12 +212,11 @@ def upper_volume(form: BodyForm, body: Grown) -> float | None:
     its own at a local optimum. None where they do not bound it."""
     near = contacts(form, body.free, body.centre, body.sizes, aside=CLOSE_BY, samples=FINE)
     near = near.chosen(near.distance <= 4.0 * CLOSE_BY * float(form.half(body.sizes).max()))
-    folds = [fold_plane(form, body.centre, body.sizes, line) for line in body.free.lines]
-    half = form.half(body.sizes)
+    half, planes = form.half(body.sizes), _planes(form, body, near)
     # room of each contact's plane about the body's centre
     rooms = near.distance + np.einsum("kj,kj->k", near.normal, half * near.unit)
-    normals = np.vstack([near.normal, *(fold.normal[None] for fold in folds)])
-    offsets = np.append(rooms, [fold.offset - fold.normal @ body.centre for fold in folds])
+    normals = np.vstack([near.normal, planes.normals])
+    offsets = np.append(rooms, planes.offsets - planes.normals @ body.centre)
     found = largest_between(form.unit, form.spread, normals, offsets / body.free.length, 2.0)
     if found is None or np.any(found.sizes > 1.99):
         return None

@@ -22,6 +22,8 @@ FloatArray = NDArray[np.float64]
 
 REGION_SAMPLES = 25
 MOST_FITTED = 4
+# a determinant that touches 0 without a change of sign is singular there
+LEAST_MARGIN = 1e-9
 # grown bodies of a smaller share of the largest one's volume are not fitted, nor those as near to another
 WORTH_FITTING, SAME = 0.6, 0.05
 # digits after which lengths are cut off, counted from the first of the mechanism's reach
@@ -98,7 +100,7 @@ def largest_body(
             remedy="Its largest range of tilts is the metric all_round_tilt.",
         )
     wanted = None if near is None else np.asarray(near, dtype=np.float64)
-    found = [grown(form, seed) for seed in seeds(mechanism, mode, margin, wanted)]
+    found = [grown(form, seed) for seed in seeds(mechanism, mode, max(margin, LEAST_MARGIN), wanted)]
     best: InscribedBody | None = None
     for start in _worth_fitting(form, [one for one in found if one is not None]):
         fit = fitted(form, start)
