@@ -47,7 +47,9 @@ def inscribe_one(
     threads = worker_threads(workers)
     shares = None if proportions is None else _proportions(proportions)
     if output is not None and not certify:
-        raise UsageError("Without a proof there is no certificate.", where="--output", remedy="Add --certify.")
+        raise UsageError(
+            "Without a proof there is no certificate.", where="--output", remedy="Add --certify."
+        )
     if not (math.isfinite(margin) and 0.0 <= margin < 1.0):
         raise UsageError(
             f"{margin:g} is no margin.", where="--margin", remedy="Choose a number from 0, less than 1."
@@ -76,7 +78,7 @@ def inscribe_one(
     proof, target = None, output or Path(FILE)
     if certify:
         proof = _proved(study, design, found, threads)
-        asked, placed = study_of(study, design, proof.body)
+        asked, _ = study_of(study, design, proof.body)
         write_document(target, document(asked.problem, asked.resolved(), asked.study_hash, proof.verdict))
     if as_json:
         data = _data(study, found, proof)

@@ -1,10 +1,10 @@
 """The largest body of a family between given planes, as one convex program.
 
 A body {centre + (spread sizes) ∘ u : u in the unit body} lies in n · x ≤ b where n · centre plus its extent
-along n is at most b. The extents of boxes, cylinders and ellipsoids are convex in the sizes, the geometric mean
-of the half sizes is concave: the program has one optimum. For ellipsoids it is the maximum-volume ellipsoid of
-R. Deits, R. Tedrake, Computing large convex regions of obstacle-free space through semidefinite programming,
-WAFR 2014, with its axes along those of the coordinates.
+along n is at most b. The extents of boxes, cylinders and ellipsoids are convex in the sizes, the geometric
+mean of the half sizes is concave: the program has one optimum. For ellipsoids it is the maximum-volume
+ellipsoid of R. Deits, R. Tedrake, Computing large convex regions of obstacle-free space through semidefinite
+programming, WAFR 2014, with its axes along those of the coordinates.
 """
 
 from __future__ import annotations
@@ -50,8 +50,10 @@ def largest_between(
 ) -> LargestBody | None:
     """The largest body with ``normals`` (N, 3) · x ≤ ``offsets`` (N,) throughout, half sizes ``spread``
     (3, k) · sizes, its centre and sizes within ± ``limit``. None where there is none, or the solver fails."""
-    import cvxpy as cp
+    import cvxpy
 
+    # its functions are not all declared for type checkers
+    cp: Any = cvxpy
     count = spread.shape[1]
     centre, sizes = cp.Variable(3), cp.Variable(count)
     room: Any = offsets - normals @ centre

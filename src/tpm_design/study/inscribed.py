@@ -23,7 +23,8 @@ def region_of(body: InscribedBody, units: Units) -> dict[str, Any]:
         # a dozen digits: converted back and forth they may differ in the last place
         return float(f"{units.from_si(value, 'm'):.13g}")
 
-    shape, data = body.shape, {"type": body.form.name}
+    shape = body.shape
+    data: dict[str, Any] = {"type": body.form.name}
     if isinstance(shape, Box):
         data |= {"size": [written(edge) for edge in shape.size]}
     elif isinstance(shape, Sphere):

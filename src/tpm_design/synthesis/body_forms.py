@@ -100,4 +100,4 @@ def _column(name: str, proportions: Sequence[float]) -> FloatArray:
             "A cylinder has its axis along z: it is as long along x as along y.",
             remedy="Give equal proportions for x and y.",
         )
-    return (values / values.max())[:, None]
+    return np.asarray(values / values.max())[:, None]

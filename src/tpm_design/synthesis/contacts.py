@@ -29,7 +29,7 @@ BISECTIONS = 50
 
 @dataclass(frozen=True, eq=False)
 class Walls:
-    """Planes ``normals`` (W, 3) · x ≤ ``offsets`` (W,), in front of parts of a bound that lie inside a body."""
+    """Planes ``normals`` (W, 3) · x ≤ ``offsets`` (W,), in front of parts of a bound that lie in a body."""
 
     normals: FloatArray
     offsets: FloatArray
@@ -98,7 +98,12 @@ def seen_from(
 
 
 def contacts_at(
-    form: BodyForm, free: FreeSet, centre: FloatArray, sizes: FloatArray, unit: FloatArray, bound: NDArray[np.int64]
+    form: BodyForm,
+    free: FreeSet,
+    centre: FloatArray,
+    sizes: FloatArray,
+    unit: FloatArray,
+    bound: NDArray[np.int64],
 ) -> Contacts:
     """Contacts at points ``unit`` (K, 3) of the unit body with bounds (K,), where these have slopes."""
     poses = centre + form.half(sizes) * unit
@@ -115,9 +120,9 @@ def contacts_at(
 def contacts(
     form: BodyForm, free: FreeSet, centre: FloatArray, sizes: FloatArray, *, aside: float, samples: int
 ) -> Contacts:
-    """The local minima of every margin over the body: of a lattice, polished, and points beside them where
-    several bounds meet, a share ``aside`` of the half sizes away. ``samples``: lattice poses along the longest
-    side."""
+    """The local minima of every margin over the body: of a lattice with ``samples`` poses along the longest
+    side, polished; and points beside them, a share ``aside`` of the half sizes away, since several bounds may
+    meet there."""
     region, half = form.region(centre, sizes), form.half(sizes)
     grid = lattice(region, samples)
     poses = np.ascontiguousarray(grid.reshape(-1, 3))
@@ -140,9 +145,7 @@ def contacts(
     beside = aside * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
     around = centre + half * (unit[:, None] + beside).reshape(-1, 3)
     inside = np.array([nearest_pose(region, (x, y, z)) for x, y, z in around.tolist()]).reshape(-1, 3)
-    every = contacts_at(
-        form, free, centre, sizes, (inside - centre) / half, np.repeat(bound, len(beside))
-    )
+    every = contacts_at(form, free, centre, sizes, (inside - centre) / half, np.repeat(bound, len(beside)))
     near = every.chosen(every.distance <= DEEP * float(half.max()))
     return replace(near, walls=walls).distinct()
 

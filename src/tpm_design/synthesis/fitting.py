@@ -62,8 +62,10 @@ def fitted(form: BodyForm, start: Grown) -> Grown | None:
 def _exchanged(form: BodyForm, start: Grown, known: Contacts | None) -> tuple[Grown | None, Contacts]:
     """The body at a local optimum with respect to its contacts on a coarse lattice and ``known`` ones."""
     best, known, _ = _shrunk(form, start, known, COARSE)
+    if best is None:
+        return None, known
     stride, idle = STRIDE, 0
-    for _ in range(MOST_EXCHANGES if best is not None else 0):
+    for _ in range(MOST_EXCHANGES):
         size, volume = float(form.half(best.sizes).max()), form.volume(best.sizes)
         trial = _solved(form, best, known, stride)
         moved = float(np.abs(np.append(trial.centre - best.centre, trial.sizes - best.sizes)).max())
@@ -93,7 +95,8 @@ def _shrunk(
     form: BodyForm, body: Grown, known: Contacts | None, samples: int
 ) -> tuple[Grown | None, Contacts, float]:
     """The body shrunk about its centre until no contact, ``known`` ones included, is beyond its bound and no
-    fold inside, None where that takes too much; all contacts on the way; and the share of its size that fits to first order."""
+    fold inside, None where that takes too much; all contacts on the way; and the share of its size that fits,
+    to first order."""
     every, first = known, 1.0
     for number in range(MOST_SHRINKINGS):
         found = contacts(form, body.free, body.centre, body.sizes, aside=ASIDE, samples=samples)

@@ -183,9 +183,7 @@ def seeds(mechanism: Mechanism, mode: Mode, floor: float, wanted: FloatArray | N
 
 
 def _sides(mechanism: Mechanism, code: int) -> tuple[float, ...]:
-    return tuple(
-        1.0 if (code - 1) >> part & 1 else -1.0 for part in range(len(mechanism.kind.determinants))
-    )
+    return tuple(1.0 if (code - 1) >> part & 1 else -1.0 for part in range(len(mechanism.kind.determinants)))
 
 
 def _code_at(mechanism: Mechanism, mode: Mode, pose: FloatArray) -> int:

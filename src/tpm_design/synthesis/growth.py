@@ -24,8 +24,8 @@ FloatArray = NDArray[np.float64]
 MOST_ROUNDS = 8
 # growth by less than this, twice, ends the rounds: what follows is quicker at it
 WORTHWHILE = 0.01
-# shares of the reach: within which a bound counts as met by a ray, where slopes are taken instead of at a kink,
-# and by which a plane hides what it touches
+# shares of the reach: within which a bound counts as met by a ray, where slopes are taken instead of at a
+# kink, and by which a plane hides what it touches
 NEAR, AROUND, HIDDEN = 1e-4, 1e-4, 1e-9
 
 

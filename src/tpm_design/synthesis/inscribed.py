@@ -26,10 +26,11 @@ MOST_FITTED = 4
 LEAST_MARGIN = 1e-9
 # grown bodies of a smaller share of the largest one's volume are not fitted, nor those as near to another
 WORTH_FITTING, SAME = 0.6, 0.05
+ALIKE = 1e-7
 # digits after which lengths are cut off, counted from the first of the mechanism's reach
 DIGITS = 9
 # shares of the sizes by which a body is shrunk until every margin holds, or grown until one is broken
-STEPS = tuple(10.0 ** (0.5 * power) for power in range(-20, 0))
+STEPS = tuple(math.pow(10.0, 0.5 * power) for power in range(-20, 0))
 # a larger step is halved so often, towards the one before
 COARSEST, HALVINGS = 1e-6, 5
 
@@ -105,9 +106,16 @@ def largest_body(
     for start in _worth_fitting(form, [one for one in found if one is not None]):
         fit = fitted(form, start)
         inside = None if fit is None else _within(form, fit)
-        if inside is not None and (best is None or inside.volume > best.volume):
+        if inside is not None and (best is None or _is_better(inside, best)):
             best = inside
     return best
+
+
+def _is_better(one: InscribedBody, other: InscribedBody) -> bool:
+    """Larger; of equally large ones, as symmetric mechanisms have them, the one that is known better."""
+    if not math.isclose(one.volume, other.volume, rel_tol=ALIKE):
+        return one.volume > other.volume
+    return other.gap is None and one.gap is not None
 
 
 def _worth_fitting(form: BodyForm, bodies: Sequence[Grown]) -> list[Grown]:
@@ -174,7 +182,8 @@ def shrunk(body: InscribedBody, share: float) -> InscribedBody:
 def _cut(body: Grown, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
     digits = DIGITS - math.floor(math.log10(body.free.length))
     grain = 10.0**-digits
-    centre = np.array([round(value, digits) for value in body.centre.tolist()])
+    # without the sign of 0
+    centre = np.array([round(value, digits) + 0.0 for value in body.centre.tolist()])
     return centre, np.array([round(math.floor(size / grain) * grain, digits) for size in sizes.tolist()])
 
 
