@@ -16,7 +16,7 @@ from tpm_design.cli.guard import NOT_PROVED, NOTHING_FEASIBLE, complain
 from tpm_design.cli.results import design_rows, error_text
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
-from tpm_design.problem import Design, Problem, design_context
+from tpm_design.problem import CENTRE, Design, Problem, design_context
 from tpm_design.report.words import lengths_text
 from tpm_design.study import Study
 from tpm_design.study.inscribed import region_of, study_of
@@ -57,8 +57,10 @@ def inscribe_one(
     study, design, assumptions = chosen_design(path, settings, allow_code=allow_code)
     context = design_context(study.problem, design)
     told = not (quiet or as_json)
-    if told and assumptions:
-        print("Assumed: " + "; ".join(assumptions) + ".\n")
+    # where the study's region lies plays no part
+    assumed = [line for line in assumptions if not line.startswith(CENTRE)]
+    if told and assumed:
+        print("Assumed: " + "; ".join(assumed) + ".\n")
     if told:
         print("Searching; the equations are compiled on first use, for up to a minute.", file=sys.stderr)
     found = largest_body(
@@ -85,7 +87,12 @@ def inscribe_one(
         print(json.dumps(data | ({"certificate": str(target)} if proof else {}), ensure_ascii=False))
     else:
         if told:
-            print(table(["design", "value", "searched in"], design_rows(study.problem, study.units, design)))
+            rows = [
+                row
+                for row in design_rows(study.problem, study.units, design)
+                if not row[0].startswith(CENTRE)
+            ]
+            print(table(["design", "value", "searched in"], rows))
             print()
         print(_text(study, found, proof))
         if proof is not None:

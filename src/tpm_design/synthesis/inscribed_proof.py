@@ -11,6 +11,8 @@ from tpm_design.synthesis.inscribed import InscribedBody, shrunk
 
 # shares of the sizes: first the middle one; where it is proved the smaller ones, else the larger ones
 SMALLER, FIRST, LARGER = (3e-3, 1e-3, 3e-4, 1e-4), 0.01, (0.03, 0.1, 0.3)
+# a proof with more boxes than this is followed by none with less to spare, which takes several times as many
+ENOUGH = 30_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +58,8 @@ def proved_body(
 
     best = tried(FIRST)
     for share in SMALLER if best.proved else LARGER:
+        if best.proved and best.verdict.boxes > ENOUGH:
+            break
         following = tried(share)
         if best.proved and not following.proved:
             break
