@@ -194,7 +194,7 @@ def is_local(method: Optimizer) -> bool:
 
 def test_the_registry_holds_every_method_under_its_name() -> None:
     assert all(name == method.name for name, method in OPTIMIZERS.items())
-    assert {name.split(".")[0] for name in OPTIMIZERS} == {"scipy", "nlopt", "convex"}
+    assert {name.split(".")[0] for name in OPTIMIZERS} == {"multistart", "scipy", "nlopt", "convex"}
     assert all(method.description and method.source for method in OPTIMIZERS.values())
 
 

@@ -68,7 +68,8 @@ class _Best:
             self._round, self._feasible, self._violation = entry.round, float("inf"), float("inf")
         if entry.evaluation.status == "feasible":
             self._feasible = min(self._feasible, minimised(self._problem, entry.evaluation))
-        self._violation = min(self._violation, entry.evaluation.violation)
+        if entry.evaluation.status != "aborted":
+            self._violation = min(self._violation, entry.evaluation.violation)
         before = f"round {self._round}: " if self._round > 1 else ""
         if self._feasible < float("inf"):
             sign = 1.0 if self._goal.sense == "minimize" else -1.0

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from tpm_design.errors import RefusedError, UsageError, did_you_mean
-from tpm_design.optimizers import convex, nlopt, scipy
+from tpm_design.optimizers import convex, multistart, nlopt, scipy
 from tpm_design.optimizers.base import Optimizer
 from tpm_design.optimizers.refusal import refusal
 
 OPTIMIZERS: Mapping[str, Optimizer] = MappingProxyType(
-    {method.name: method for method in (*scipy.METHODS, *nlopt.METHODS, *convex.METHODS)}
+    {method.name: method for method in (*multistart.METHODS, *scipy.METHODS, *nlopt.METHODS, *convex.METHODS)}
 )
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +24,14 @@ class Stalled(Exception):  # noqa: N818 - an ordinary end of a search, not an er
 @dataclass(frozen=True)
 class Outcomes:
     """Values at N points: ``objective`` (N,) to minimise, ``constraints`` (N, m) met where ≥ 0 (each
-    divided by its metric's scale), ``merit`` (N,) = objective + exact penalty, finite everywhere."""
+    divided by its metric's scale), ``merit`` (N,) = objective + exact penalty, finite everywhere.
+    ``aborted`` (N,), or empty for none: points that a ``ScreeningSearch`` did not measure to the end. What is
+    not known of them is 0 of a constraint, and their merit is behind those that were asked for."""
 
     objective: FloatArray
     constraints: FloatArray
     merit: FloatArray
+    aborted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
 
 class Search(Protocol):
@@ -49,6 +52,16 @@ class Search(Protocol):
 
     def evaluate(self, points: FloatArray) -> Outcomes:
         """Values at ``points`` (N, n), in order; repeated points cost nothing. Raises BudgetSpent."""
+        ...
+
+
+@runtime_checkable
+class ScreeningSearch(Search, Protocol):
+    """A search that need not measure everything of points that are not among the best."""
+
+    def screen(self, points: FloatArray, keep: int) -> Outcomes:
+        """As ``evaluate``; only the ``keep`` best of ``points``, by violation and then by objective, are sure
+        to be measured to the end. Raises BudgetSpent."""
         ...
 
 

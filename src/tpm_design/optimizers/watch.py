@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpm_design.optimizers.base import FloatArray, Outcomes, Search, Stalled
+from tpm_design.optimizers.base import FloatArray, Outcomes, ScreeningSearch, Search, Stalled
 
 LOCAL_STEP = 0.05
 """First step of local methods, as a share of each variable's range: chosen on constrained problems in seven
@@ -61,6 +61,16 @@ class Watch:
 
         Raises whatever ended the search first, again at every later call.
         """
+        return self._asked(points, self.search.evaluate)
+
+    def screen(self, points: FloatArray, keep: int) -> Outcomes:
+        """As ``evaluate``, the ``keep`` best of them to the end; all where the search cannot screen."""
+        search = self.search
+        if not isinstance(search, ScreeningSearch):
+            return self.evaluate(points)
+        return self._asked(points, lambda inside: search.screen(inside, keep))
+
+    def _asked(self, points: FloatArray, ask: Callable[[FloatArray], Outcomes]) -> Outcomes:
         if self.stopped is not None:
             raise self.stopped
         try:
@@ -69,7 +79,7 @@ class Watch:
             if np.isnan(inside).any():
                 raise Stalled("The method broke down: it asked for a point that is not a number.")
             self._note(inside)
-            return self.search.evaluate(inside)
+            return ask(inside)
         except BaseException as reason:
             self.stopped = reason
             raise
