@@ -98,6 +98,7 @@ class _Course:
         self._whole = self._pieces = Watch(search)
         self._levels = self._whole.levels
         self._free = np.flatnonzero(self._levels == 0)
+        self._designs = np.inf if len(self._free) else prod(self._levels.tolist())
         self._random = np.random.default_rng(seed)
         self._starts = Starts(self._whole, seed)
         self._optima: list[Optimum] = []
@@ -107,7 +108,7 @@ class _Course:
     def run(self) -> str:
         self._starts.sample()
         under_way: list[tuple[Task, FloatArray]] = []
-        while not self._converged():
+        while not self._few_left() and not self._converged():
             while len(under_way) < ABREAST:
                 task = self._next_task()
                 if (first := next(task, None)) is not None:
@@ -124,7 +125,8 @@ class _Course:
                 except StopIteration:
                     continue
             under_way = going_on
-        if not len(self._free) and self._enumerate():
+        if self._designs <= ENUMERATED:
+            self._enumerate()
             return "Converged: every design was evaluated."
         hits = sum(optimum.hits for optimum in self._best_ones())
         return f"Converged: {hits} of {self._landed} independent local searches ended at the best objective."
@@ -259,14 +261,16 @@ class _Course:
             ordered = sorted(self._optima, key=lambda optimum: optimum.place.objective)
             self._search.note_optima(np.array([optimum.place.point for optimum in ordered]))
 
-    def _enumerate(self) -> bool:
-        """Evaluate every design where there are few."""
+    def _few_left(self) -> bool:
+        """Whether it is time to evaluate every design: after a few local searches, or a sample as large."""
+        return self._designs <= min(ENUMERATED, 2 * self._starts.batch) or (
+            self._designs <= ENUMERATED and self._ended >= FIRST_STARTS
+        )
+
+    def _enumerate(self) -> None:
         counts = self._levels.tolist()
-        if prod(counts) > ENUMERATED:
-            return False
         numbers = np.indices(counts).reshape(len(counts), -1).T
         self._whole.evaluate((numbers + 0.5) / self._levels)
-        return True
 
 
 METHODS = (
