@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
-from tpm_design.workspace.aspects import RayField, locate, mode_field, region_field
+from tpm_design.workspace.aspects import RayField, locate, located, mode_field, region_field
 from tpm_design.workspace.extremes import Extreme, least_over_region
 from tpm_design.workspace.fold_clearance import fold_clearance
 from tpm_design.workspace.indices import DETERMINANT, EXTENT, REACH, Index
@@ -180,3 +180,7 @@ class Context:
     def aspect_of(self, field: RayField, pose: tuple[float, float, float]) -> int | None:
         """Component of ``field`` that holds ``pose``."""
         return locate(self.mechanism, self.mode, field, pose)
+
+    def aspects_of(self, field: RayField, poses: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Components (N,) of ``field`` that hold poses (N, 3), −1 where none does."""
+        return located(self.mechanism, self.mode, field, poses)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.arithmetic import kernel
+from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.directions import ALL_OCTANTS, Octant, RaySet, ray_set
 from tpm_design.workspace.joined_sets import find, join
 from tpm_design.workspace.poses import aspect_code
-from tpm_design.workspace.rays import Segments, trace
+from tpm_design.workspace.rays import Segments, traced
 from tpm_design.workspace.region_geometry import BOX, CYLINDER, PlacedRegion
 
 
@@ -38,7 +39,7 @@ class RayField:
         return int(np.argmax(self.volumes)) if self.volumes.size else None
 
 
-@kernel
+@inner
 def _components(rays, start, end, code, neighbours, weights):  # type: ignore[no-untyped-def]
     """Join segments of neighbouring rays that have one code and overlap; number the sets in order.
 
@@ -70,6 +71,14 @@ def _components(rays, start, end, code, neighbours, weights):  # type: ignore[no
     return component, volumes[:count]
 
 
+@kernel
+def _joined(geometry, mode, sided, part_count, floor, origin, steps, limits, neighbours, weights):  # type: ignore[no-untyped-def]
+    """Segments of the rays, the set of each, and per set Σ weight ∫ t² dt."""
+    segments = traced(geometry, mode, sided, part_count, floor, origin, steps, limits)
+    ray, start, end, code = segments
+    return segments, _components(ray, start, end, code, neighbours, weights)
+
+
 def ray_field(
     mechanism: Mechanism,
     mode: Mode,
@@ -81,25 +90,24 @@ def ray_field(
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> RayField:
-    """Trace the rays and join what is connected."""
-    segments = trace(
+    """Trace the rays and join what is connected. ``sided``: cut where a determinant changes side or falls to
+    ``floor``; otherwise reach alone. ``limits`` (N,): ray parameters at which the rays end."""
+    segments, (component, volumes) = _joined(
         mechanism.geometry,
         mode.signs,
-        determinant_count=len(mechanism.kind.determinants),
-        sided=sided,
-        floor=floor,
-        origin=origin,
-        scale=scale,
-        directions=rays.directions,
-        limits=limits,
-    )
-    component, volumes = _components(
-        segments.ray, segments.start, segments.end, segments.code, rays.neighbours, rays.weights
+        sided,
+        len(mechanism.kind.determinants),
+        floor,
+        origin,
+        rays.directions * np.asarray(scale),
+        limits,
+        rays.neighbours,
+        rays.weights,
     )
     cell = abs(scale[0] * scale[1] * scale[2])
     volumes *= cell
     whole = cell * float(rays.weights @ limits**3) / 3.0
-    return RayField(origin, scale, rays, segments, component, volumes, whole)
+    return RayField(origin, scale, rays, Segments(*segments), component, volumes, whole)
 
 
 def mode_field(mechanism: Mechanism, mode: Mode, *, order: int, sided: bool, floor: float = 0.0) -> RayField:
@@ -137,21 +145,88 @@ def region_field(mechanism: Mechanism, mode: Mode, region: PlacedRegion, *, orde
     )
 
 
-def locate(mechanism: Mechanism, mode: Mode, field: RayField, pose: tuple[float, float, float]) -> int | None:
-    """Component of the field that holds a pose: the segment of its sides on the nearest ray that overlaps
-    its radius, or None where the pose lies in no aspect."""
-    x, y, z = pose
-    code = aspect_code(mechanism.geometry, mode.signs, x, y, z)
-    candidates = np.flatnonzero(field.segments.code == code)
-    if code == 0 or not candidates.size:
-        return None
-    steps = field.rays.directions * np.asarray(field.scale)
-    offset = np.asarray(pose) - np.asarray(field.origin)
-    chosen = steps[field.segments.ray[candidates]]
-    along = np.clip(
-        (chosen @ offset) / (chosen**2).sum(axis=1),
-        field.segments.start[candidates],
-        field.segments.end[candidates],
+@kernel
+def _located(geometry, mode, origin, scale, directions, segments, component, poses):  # type: ignore[no-untyped-def]
+    """As ``located``."""
+    rays, start, end, codes = segments
+    found = np.full(poses.shape[0], -1, np.int64)
+    for n in range(poses.shape[0]):
+        x, y, z = poses[n, 0], poses[n, 1], poses[n, 2]
+        code = aspect_code(geometry, mode, x, y, z)
+        if code == 0:
+            continue
+        x, y, z = x - origin[0], y - origin[1], z - origin[2]
+        least = math.inf
+        for s in range(codes.size):
+            if codes[s] == code:
+                ray = rays[s]
+                u, v, w = (
+                    scale[0] * directions[ray, 0],
+                    scale[1] * directions[ray, 1],
+                    scale[2] * directions[ray, 2],
+                )
+                along = (u * x + v * y + w * z) / (u * u + v * v + w * w)
+                along = min(end[s], max(start[s], along))
+                distance = math.sqrt((along * u - x) ** 2 + (along * v - y) ** 2 + (along * w - z) ** 2)
+                if distance < least:
+                    least = distance
+                    found[n] = component[s]
+    return found
+
+
+def located(
+    mechanism: Mechanism, mode: Mode, field: RayField, poses: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Components (N,) of the field that hold poses (N, 3): of the segment of a pose's sides on the nearest
+    ray that overlaps its radius, −1 where the pose lies in no aspect."""
+    parts = field.segments
+    found: NDArray[np.int64] = _located(
+        mechanism.geometry,
+        mode.signs,
+        field.origin,
+        field.scale,
+        field.rays.directions,
+        (parts.ray, parts.start, parts.end, parts.code),
+        field.component,
+        np.ascontiguousarray(poses, dtype=np.float64),
     )
-    distances = np.linalg.norm(along[:, None] * chosen - offset, axis=1)
-    return int(field.component[candidates[np.argmin(distances)]])
+    return found
+
+
+def locate(mechanism: Mechanism, mode: Mode, field: RayField, pose: tuple[float, float, float]) -> int | None:
+    """Component of the field that holds one pose, or None; as ``located``."""
+    component = int(located(mechanism, mode, field, np.array([pose]))[0])
+    return None if component < 0 else component
+
+
+@kernel
+def _longest(rays, start, end, code, component, count, origin, scale, directions):  # type: ignore[no-untyped-def]
+    """As ``longest_segments``."""
+    codes, poses = np.empty(count, np.int64), np.empty((count, 3))
+    longest = np.full(count, -1.0)
+    for s in range(rays.size):
+        number = component[s]
+        if end[s] - start[s] > longest[number]:
+            longest[number] = end[s] - start[s]
+            codes[number] = code[s]
+            middle = 0.5 * (start[s] + end[s])
+            for axis in range(3):
+                poses[number, axis] = origin[axis] + middle * scale[axis] * directions[rays[s], axis]
+    return codes, poses
+
+
+def longest_segments(field: RayField) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """The sides (C,) of each component, and the pose (C, 3) in the middle of its longest segment."""
+    parts = field.segments
+    codes, poses = _longest(
+        parts.ray,
+        parts.start,
+        parts.end,
+        parts.code,
+        field.component,
+        field.volumes.size,
+        field.origin,
+        field.scale,
+        field.rays.directions,
+    )
+    return codes, poses

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
-from tpm_design.workspace.indices import Index, index_value, index_values
+from tpm_design.workspace.indices import Index, index_value, values_at
 from tpm_design.workspace.region_geometry import POINTS, PlacedRegion, nearest, surface_frame
 
 EIGHTHS = 8
@@ -76,13 +76,7 @@ def _best_of_eighths(region, points, values, stride):  # type: ignore[no-untyped
     return best
 
 
-@kernel
-def _chosen(region, points, values):  # type: ignore[no-untyped-def]
-    """Where to polish from: each eighth's best pose, and the best of every second pose alone."""
-    return _best_of_eighths(region, points, values, 1), _best_of_eighths(region, points, values, 2)
-
-
-@kernel
+@inner
 def _polished(geometry, mode, region, index, points, values, chosen, step, smallest):  # type: ignore[no-untyped-def]
     """(value, decrease by the smallest steps, x, y, z) (K, 5) from each chosen pose; rows of +inf where
     it is −1."""
@@ -94,6 +88,35 @@ def _polished(geometry, mode, region, index, points, values, chosen, step, small
             value, gain, x, y, z = _polish(geometry, mode, region, index, start, values[n], step, smallest)
             out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = value, gain, x, y, z
     return out
+
+
+@kernel
+def _least(geometry, mode, region, index, points, spacing):  # type: ignore[no-untyped-def]
+    """Value, error, pose and pieces (8,) of ``Extreme``, the index's sign still on them."""
+    values = values_at(geometry, mode, index, points)
+    if region.form == POINTS:
+        n = values.argmin()
+        value, error, pose = values[n], 0.0, (points[n, 0], points[n, 1], points[n, 2])
+        pieces = np.full(EIGHTHS, value)
+    else:
+        # each eighth's best pose, then the best of every second pose alone where that is another one
+        chosen = np.empty(2 * EIGHTHS, np.int64)
+        chosen[:EIGHTHS] = _best_of_eighths(region, points, values, 1)
+        chosen[EIGHTHS:] = _best_of_eighths(region, points, values, 2)
+        halved = np.empty(EIGHTHS, np.int64)
+        for eighth in range(EIGHTHS):
+            halved[eighth] = eighth + EIGHTHS
+            if chosen[eighth + EIGHTHS] == chosen[eighth]:
+                halved[eighth] = eighth
+                chosen[eighth + EIGHTHS] = -1
+        step, smallest = 0.5 * spacing, FINEST_STEP * spacing
+        found = _polished(geometry, mode, region, index, points, values, chosen, step, smallest)
+        best = found[:, 0].argmin()
+        value, pose = found[best, 0], (found[best, 2], found[best, 3], found[best, 4])
+        error = found[halved, 0].min() - value + found[best, 1]
+        pieces = np.where(np.isfinite(found[:EIGHTHS, 0]), found[:EIGHTHS, 0], value)
+        pieces[pieces.argmin()] = value
+    return value, error, pose, pieces
 
 
 def least_over_region(
@@ -108,28 +131,8 @@ def least_over_region(
 
     ``points`` (N, 3): the region's lattice; ``spacing`` (m) between its poses.
     """
-    values = index_values(geometry, signs, index, points)
-    if region.form == POINTS:
-        n = int(values.argmin())
-        value, error, pose, pieces = values[n], 0.0, points[n], np.full(EIGHTHS, values[n])
-    else:
-        fine, coarse = _chosen(region, points, values)
-        chosen = np.concatenate([fine, np.where(coarse == fine, -1, coarse)])
-        found = _polished(
-            geometry, signs, region, index, points, values, chosen, 0.5 * spacing, FINEST_STEP * spacing
-        )
-        best = int(found[:, 0].argmin())
-        value, pose = found[best, 0], found[best, 2:]
-        halved = np.where(coarse == fine, found[:EIGHTHS, 0], found[EIGHTHS:, 0])
-        error = halved.min() - value + found[best, 1]
-        pieces = np.where(np.isfinite(found[:EIGHTHS, 0]), found[:EIGHTHS, 0], value)
-        pieces[pieces.argmin()] = value
+    value, error, pose, pieces = _least(geometry, signs, region, index, points, spacing)
     # shrinks with the lattice, so that a finer look at the same pose never contradicts a coarser one
     longest = 2.0 * max(region.half)
     floor = ERROR_FLOOR * abs(value) * (min(1.0, spacing / longest) if longest > 0.0 else 1.0)
-    return Extreme(
-        float(index.sign * value),
-        float(error + floor),
-        (float(pose[0]), float(pose[1]), float(pose[2])),
-        tuple((index.sign * pieces).tolist()),
-    )
+    return Extreme(index.sign * value, error + floor, pose, tuple((index.sign * pieces).tolist()))
