@@ -9,7 +9,7 @@ import numpy as np
 
 from tpm_design.metrics.base import Measurement, Metric, Option, of_positions
 from tpm_design.metrics.context import Context
-from tpm_design.workspace.aspects import RayField, longest_segments
+from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.region_geometry import POINTS
 from tpm_design.workspace.volume import selected_volume
 
@@ -75,11 +75,11 @@ def _largest_share(context: Context, field: RayField) -> float:
     """Share of the region in one aspect; parts of equal sides may be joined outside the region."""
     if not field.volumes.size:
         return 0.0
-    codes, poses = longest_segments(field)
+    codes = field.sides
     shared = np.flatnonzero(np.bincount(codes)[codes] > 1)
     aspects = np.zeros_like(codes)
     if shared.size:
-        aspects[shared] = context.aspects_of(context.aspects[0], poses[shared])
+        aspects[shared] = context.aspects_of(context.aspects[0], field.middles[shared])
         # what lies in no aspect is joined with nothing
         lost = shared[aspects[shared] < 0]
         aspects[lost] = -1 - lost

@@ -8,7 +8,7 @@ import math
 import os
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -125,7 +125,7 @@ def _log_line(entry: Entry) -> str:
 
 def entry_to_json(entry: Entry) -> dict[str, Any]:
     """An evaluation with exact floats; a violation without a number becomes null."""
-    data = asdict(entry.evaluation)
+    data = vars(entry.evaluation) | {"design": dict(entry.evaluation.design)}
     data["violation"] = data["violation"] if math.isfinite(data["violation"]) else None
     data["metrics"] = {k: v if math.isfinite(v) else None for k, v in data["metrics"].items()}
     data["errors"] = {k: v if math.isfinite(v) else None for k, v in data["errors"].items()}

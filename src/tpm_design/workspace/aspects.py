@@ -17,13 +17,17 @@ from tpm_design.workspace.poses import aspect_code
 from tpm_design.workspace.rays import Segments, traced
 from tpm_design.workspace.region_geometry import BOX, CYLINDER, PlacedRegion
 
+# of the coarse field where a fine one is asked for alone
+LEAST_ORDER = 2
+
 
 @dataclass(frozen=True)
 class RayField:
     """Rays through space and the parts of them that lie in the workspace.
 
     ``origin``, ``scale``: pose = origin + t · scale · direction. ``component`` (S,): which connected set
-    a segment belongs to. ``volumes`` (C,): their volumes (m³). ``whole`` (m³): volume of all the rays.
+    a segment belongs to. Of these sets: ``volumes`` (C,) in m³, ``sides`` (C,) the code of their segments,
+    ``middles`` (C, 3) the pose (m) in the middle of the longest one. ``whole`` (m³): volume of all the rays.
     """
 
     origin: tuple[float, float, float]
@@ -32,6 +36,8 @@ class RayField:
     segments: Segments
     component: NDArray[np.int64]
     volumes: NDArray[np.float64]
+    sides: NDArray[np.int64]
+    middles: NDArray[np.float64]
     whole: float
 
     def largest(self) -> int | None:
@@ -71,53 +77,103 @@ def _components(rays, start, end, code, neighbours, weights):  # type: ignore[no
     return component, volumes[:count]
 
 
-@kernel
-def _joined(geometry, mode, sided, part_count, floor, origin, steps, limits, neighbours, weights):  # type: ignore[no-untyped-def]
-    """Segments of the rays, the set of each, and per set Σ weight ∫ t² dt."""
+@inner
+def _longest(segments, component, count, origin, steps):  # type: ignore[no-untyped-def]
+    """Code (C,) of each set's segments, and the pose (C, 3) in the middle of the longest one."""
+    rays, start, end, code = segments
+    sides, middles = np.empty(count, np.int64), np.empty((count, 3))
+    longest = np.full(count, -1.0)
+    for s in range(rays.size):
+        number = component[s]
+        if end[s] - start[s] > longest[number]:
+            longest[number] = end[s] - start[s]
+            sides[number] = code[s]
+            t = 0.5 * (start[s] + end[s])
+            for axis in range(3):
+                middles[number, axis] = origin[axis] + t * steps[rays[s], axis]
+    return sides, middles
+
+
+@inner
+def _traced_and_joined(geometry, mode, sided, part_count, floor, origin, scale, rays):  # type: ignore[no-untyped-def]
+    """Segments of the rays, the set of each, volumes, sides and middles of the sets, volume of all rays."""
+    directions, limits, neighbours, weights = rays
+    steps = np.empty(directions.shape)
+    for n in range(weights.size):
+        for axis in range(3):
+            steps[n, axis] = directions[n, axis] * scale[axis]
     segments = traced(geometry, mode, sided, part_count, floor, origin, steps, limits)
     ray, start, end, code = segments
-    return segments, _components(ray, start, end, code, neighbours, weights)
+    component, volumes = _components(ray, start, end, code, neighbours, weights)
+    volumes *= abs(scale[0] * scale[1] * scale[2])
+    sides, middles = _longest(segments, component, volumes.size, origin, steps)
+    return segments, component, volumes, sides, middles
 
 
-def ray_field(
+@kernel
+def _two_fields(geometry, mode, sided, part_count, floor, origin, scale, fine, coarse):  # type: ignore[no-untyped-def]
+    """As ``_traced_and_joined``, of two sets of rays."""
+    return (
+        _traced_and_joined(geometry, mode, sided, part_count, floor, origin, scale, fine),
+        _traced_and_joined(geometry, mode, sided, part_count, floor, origin, scale, coarse),
+    )
+
+
+def _fields(
     mechanism: Mechanism,
     mode: Mode,
+    rays: tuple[RaySet, RaySet],
+    limits: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
-    rays: RaySet,
-    limits: NDArray[np.float64],
     sided: bool,
     floor: float = 0.0,
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
-) -> RayField:
+    scale: tuple[float, float, float],
+) -> tuple[RayField, RayField]:
     """Trace the rays and join what is connected. ``sided``: cut where a determinant changes side or falls to
     ``floor``; otherwise reach alone. ``limits`` (N,): ray parameters at which the rays end."""
-    segments, (component, volumes) = _joined(
-        mechanism.geometry,
-        mode.signs,
-        sided,
-        len(mechanism.kind.determinants),
-        floor,
-        origin,
-        rays.directions * np.asarray(scale),
-        limits,
-        rays.neighbours,
-        rays.weights,
+    fine, coarse = (
+        (each.directions, ends, each.neighbours, each.weights)
+        for each, ends in zip(rays, limits, strict=True)
     )
+    count = len(mechanism.kind.determinants)
+    found = _two_fields(mechanism.geometry, mode.signs, sided, count, floor, origin, scale, fine, coarse)
     cell = abs(scale[0] * scale[1] * scale[2])
-    volumes *= cell
-    whole = cell * float(rays.weights @ limits**3) / 3.0
-    return RayField(origin, scale, rays, Segments(*segments), component, volumes, whole)
+    one, other = (
+        RayField(
+            origin=origin,
+            scale=scale,
+            rays=each,
+            segments=Segments(*segments),
+            component=component,
+            volumes=volumes,
+            sides=sides,
+            middles=middles,
+            whole=cell * float(each.weights @ ends**3) / 3.0,
+        )
+        for each, ends, (segments, component, volumes, sides, middles) in zip(
+            rays, limits, found, strict=True
+        )
+    )
+    return one, other
 
 
-def mode_field(mechanism: Mechanism, mode: Mode, *, order: int, sided: bool, floor: float = 0.0) -> RayField:
-    """The whole workspace of the mode, by ``order``² rays per square from the origin."""
-    rays = ray_set(mode_octants(mode), order)
+def mode_fields(
+    mechanism: Mechanism, mode: Mode, *, orders: tuple[int, int], sided: bool, floor: float = 0.0
+) -> tuple[RayField, RayField]:
+    """The whole workspace of the mode, by the square of each order of rays per square from the origin."""
+    octants = mode_octants(mode)
+    fine, coarse = ray_set(octants, orders[0]), ray_set(octants, orders[1])
     half = np.asarray(mechanism.reach_half_axes())
     radius = float(half.max())
     x, y, z = (half / radius).tolist()
-    limits = radius / rays.lengths
-    return ray_field(mechanism, mode, rays=rays, limits=limits, sided=sided, floor=floor, scale=(x, y, z))
+    limits = radius / fine.lengths, radius / coarse.lengths
+    return _fields(mechanism, mode, (fine, coarse), limits, sided=sided, floor=floor, scale=(x, y, z))
+
+
+def mode_field(mechanism: Mechanism, mode: Mode, *, order: int, sided: bool, floor: float = 0.0) -> RayField:
+    """As ``mode_fields``, the field of one order alone."""
+    return mode_fields(mechanism, mode, orders=(order, LEAST_ORDER), sided=sided, floor=floor)[0]
 
 
 def mode_octants(mode: Mode) -> tuple[Octant, ...]:
@@ -130,19 +186,27 @@ def _octants_of(signs: tuple[float, float, float]) -> tuple[Octant, ...]:
     return tuple(o for o in ALL_OCTANTS if all(s in (0.0, float(k)) for s, k in zip(signs, o, strict=True)))
 
 
-def region_field(mechanism: Mechanism, mode: Mode, region: PlacedRegion, *, order: int) -> RayField:
-    """The parts of a solid region in each aspect, by ``order``² rays per square from its centre."""
-    rays = ray_set(ALL_OCTANTS, order)
-    if region.form == BOX:
-        limits = np.ones(rays.weights.size)
-    elif region.form == CYLINDER:
-        across = np.linalg.norm(rays.directions[:, :2], axis=1)
-        limits = np.minimum(1.0 / across, 1.0 / np.abs(rays.directions[:, 2]))
-    else:
-        limits = 1.0 / rays.lengths
-    return ray_field(
-        mechanism, mode, rays=rays, limits=limits, sided=True, origin=region.centre, scale=region.half
+def region_fields(
+    mechanism: Mechanism, mode: Mode, region: PlacedRegion, *, orders: tuple[int, int]
+) -> tuple[RayField, RayField]:
+    """The parts of a solid region in each aspect, by the square of each order of rays per square from its
+    centre."""
+    fine, coarse = ray_set(ALL_OCTANTS, orders[0]), ray_set(ALL_OCTANTS, orders[1])
+    limits = _region_limits(region.form, orders[0]), _region_limits(region.form, orders[1])
+    return _fields(
+        mechanism, mode, (fine, coarse), limits, sided=True, origin=region.centre, scale=region.half
     )
+
+
+@lru_cache(maxsize=64)
+def _region_limits(form: int, order: int) -> NDArray[np.float64]:
+    rays = ray_set(ALL_OCTANTS, order)
+    if form == BOX:
+        return np.ones(rays.weights.size)
+    if form == CYLINDER:
+        across = np.linalg.norm(rays.directions[:, :2], axis=1)
+        return np.minimum(1.0 / across, 1.0 / np.abs(rays.directions[:, 2]))
+    return 1.0 / rays.lengths
 
 
 @kernel
@@ -197,36 +261,3 @@ def locate(mechanism: Mechanism, mode: Mode, field: RayField, pose: tuple[float,
     """Component of the field that holds one pose, or None; as ``located``."""
     component = int(located(mechanism, mode, field, np.array([pose]))[0])
     return None if component < 0 else component
-
-
-@kernel
-def _longest(rays, start, end, code, component, count, origin, scale, directions):  # type: ignore[no-untyped-def]
-    """As ``longest_segments``."""
-    codes, poses = np.empty(count, np.int64), np.empty((count, 3))
-    longest = np.full(count, -1.0)
-    for s in range(rays.size):
-        number = component[s]
-        if end[s] - start[s] > longest[number]:
-            longest[number] = end[s] - start[s]
-            codes[number] = code[s]
-            middle = 0.5 * (start[s] + end[s])
-            for axis in range(3):
-                poses[number, axis] = origin[axis] + middle * scale[axis] * directions[rays[s], axis]
-    return codes, poses
-
-
-def longest_segments(field: RayField) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The sides (C,) of each component, and the pose (C, 3) in the middle of its longest segment."""
-    parts = field.segments
-    codes, poses = _longest(
-        parts.ray,
-        parts.start,
-        parts.end,
-        parts.code,
-        field.component,
-        field.volumes.size,
-        field.origin,
-        field.scale,
-        field.rays.directions,
-    )
-    return codes, poses

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +91,7 @@ def _polished(geometry, mode, region, index, points, values, chosen, step, small
     return out
 
 
-@kernel
+@inner
 def _least(geometry, mode, region, index, points, spacing):  # type: ignore[no-untyped-def]
     """Value, error, pose and pieces (8,) of ``Extreme``, the index's sign still on them."""
     values = values_at(geometry, mode, index, points)
@@ -119,20 +120,37 @@ def _least(geometry, mode, region, index, points, spacing):  # type: ignore[no-u
     return value, error, pose, pieces
 
 
-def least_over_region(
+@kernel
+def _extremes(geometry, mode, region, indices, points, spacing):  # type: ignore[no-untyped-def]
+    """One row for each row of ``indices`` (quantity, part, motor, sign): value, error, pose, pieces."""
+    out = np.empty((indices.shape[0], 5 + EIGHTHS))
+    for k in range(indices.shape[0]):
+        sign = indices[k, 3]
+        index = Index(int(indices[k, 0]), int(indices[k, 1]), indices[k, 2], sign)
+        value, error, pose, pieces = _least(geometry, mode, region, index, points, spacing)
+        # shrinks with the lattice, so that a finer look at the same pose never contradicts a coarser one
+        longest = 2.0 * max(region.half)
+        floor = ERROR_FLOOR * abs(value) * (min(1.0, spacing / longest) if longest > 0.0 else 1.0)
+        out[k, 0], out[k, 1] = sign * value, error + floor
+        for axis in range(3):
+            out[k, 2 + axis] = pose[axis]
+        for eighth in range(EIGHTHS):
+            out[k, 5 + eighth] = sign * pieces[eighth]
+    return out
+
+
+def extremes_over_region(
     geometry: object,
     signs: object,
     region: PlacedRegion,
-    index: Index,
+    indices: Sequence[Index],
     points: NDArray[np.float64],
     spacing: float,
-) -> Extreme:
-    """The least value of the index (the greatest for sign −1) over the region.
+) -> tuple[Extreme, ...]:
+    """The least value of each index (the greatest for sign −1) over the region.
 
     ``points`` (N, 3): the region's lattice; ``spacing`` (m) between its poses.
     """
-    value, error, pose, pieces = _least(geometry, signs, region, index, points, spacing)
-    # shrinks with the lattice, so that a finer look at the same pose never contradicts a coarser one
-    longest = 2.0 * max(region.half)
-    floor = ERROR_FLOOR * abs(value) * (min(1.0, spacing / longest) if longest > 0.0 else 1.0)
-    return Extreme(index.sign * value, error + floor, pose, tuple((index.sign * pieces).tolist()))
+    table = np.array(indices, dtype=np.float64).reshape(-1, 4)
+    rows = _extremes(geometry, signs, region, table, points, spacing).tolist()
+    return tuple(Extreme(row[0], row[1], (row[2], row[3], row[4]), tuple(row[5:])) for row in rows)
