@@ -100,7 +100,8 @@ class Problem:
 class Evaluation:
     """One evaluated design, SI units. ``slacks``: constraint label → signed distance to its bound, the
     least of its ``pieces``: one number, or a fixed number of them, smoother in the design; those of the
-    problem's samples included."""
+    problem's samples included. Of several objectives ``pieces`` has the values of which each is the least or
+    the greatest, none where it is one by itself."""
 
     design: Design
     metrics: Mapping[str, float]
@@ -141,6 +142,9 @@ def evaluate(problem: Problem, design: Design) -> Evaluation:
     own = {goal.label: slack_pieces(goal, measurements[goal.label]) for goal in problem.constraints}
     pieces = {label: values + sampled.pieces.get(label, ()) for label, values in own.items()}
     slacks = {label: min(values) for label, values in pieces.items()}
+    if len(problem.objectives) > 1:
+        # a search for a front bounds objectives too
+        pieces |= {goal.label: measurements[goal.label].pieces for goal in problem.objectives}
     short = {goal.label: max(0.0, -slacks[goal.label]) / goal.metric.scale for goal in problem.constraints}
     for goal in problem.objectives:
         if goal.label in undefined:

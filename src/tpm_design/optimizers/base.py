@@ -25,12 +25,14 @@ class Stalled(Exception):  # noqa: N818 - an ordinary end of a search, not an er
 class Outcomes:
     """Values at N points: ``objective`` (N,) to minimise, ``constraints`` (N, m) met where ≥ 0 (each
     divided by its metric's scale), ``merit`` (N,) = objective + exact penalty, finite everywhere.
-    ``objectives`` (N, k): all of them, each to minimise, of a ``FrontSearch``."""
+    Of a ``FrontSearch``: ``objectives`` (N, k), all of them, each to minimise, and ``objective_pieces``: for
+    each of them an array (N, s) whose greatest value it is, smoother in the design."""
 
     objective: FloatArray
     constraints: FloatArray
     merit: FloatArray
     objectives: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    objective_pieces: tuple[FloatArray, ...] = ()
 
 
 class Search(Protocol):
@@ -60,6 +62,11 @@ class FrontSearch(Search, Protocol):
 
     @property
     def objective_count(self) -> int: ...
+
+    def in_pieces(self, point: FloatArray) -> FrontSearch:
+        """The same search, constraints and objectives in as many pieces as a point (n,) has of each. Raises
+        BudgetSpent."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -120,13 +120,14 @@ class EvaluationLog:
 @dataclass(frozen=True)
 class UnitSearch:
     """A ``Search`` over a design space, up to ``limit`` entries in the log. ``sizes``: in how many smooth
-    pieces each constraint is given to the optimiser."""
+    pieces each constraint is given to the optimiser; ``objective_sizes``: each objective, empty for one."""
 
     log: EvaluationLog
     space: DesignSpace
     start: FloatArray
     limit: int
     sizes: tuple[int, ...]
+    objective_sizes: tuple[int, ...] = ()
 
     @property
     def dimension(self) -> int:
@@ -148,7 +149,7 @@ class UnitSearch:
         """Values at ``points`` (N, n). Raises BudgetSpent."""
         table = np.atleast_2d(np.asarray(points, dtype=np.float64))
         results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
-        return outcomes(self.log.problem, results, self.sizes)
+        return outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
 
     def relaxed_optima(self) -> FloatArray:
         """Points (N, n) of the convex relaxation's designs, see ``synthesis``. Raises RefusedError where the
@@ -157,6 +158,17 @@ class UnitSearch:
         designs = relaxed_designs(self.log.problem, self.space.design(self.start), self.limit + 1)
         points = [self.space.point(design) for design in designs]
         return np.array(points, dtype=np.float64).reshape(-1, self.dimension)
+
+    def in_pieces(self, point: FloatArray) -> UnitSearch:
+        """The same search, constraints and objectives in as many pieces as a point (n,) has of each. Raises
+        BudgetSpent."""
+        problem = self.log.problem
+        (found,) = self.log.evaluations([self.space.design(point)], self.limit)
+        sizes = [
+            max(1, len(found.pieces.get(g.label, ()))) for g in (*problem.constraints, *problem.objectives)
+        ]
+        count = len(problem.constraints)
+        return replace(self, sizes=tuple(sizes[:count]), objective_sizes=tuple(sizes[count:]))
 
     def continuous_near(self, entry: Entry, share: float, limit: int) -> UnitSearch:
         """The search of the continuous variables alone, within ``share`` of their ranges around a design
@@ -231,9 +243,14 @@ def _minimised(goal: Goal, evaluation: Evaluation) -> float:
     return (value if goal.sense == "minimize" else -value) / goal.metric.scale
 
 
-def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[int]) -> Outcomes:
+def outcomes(
+    problem: Problem,
+    results: Sequence[Evaluation],
+    sizes: Sequence[int],
+    objective_sizes: Sequence[int] = (),
+) -> Outcomes:
     """What an optimiser gets to see, finite everywhere. ``sizes``: number of pieces of each constraint; a
-    constraint of fewer pieces repeats its least."""
+    constraint of fewer pieces repeats its least. ``objective_sizes``: of each objective, by default one."""
     objectives = np.array([scaled_objectives(problem, result) for result in results])
     objectives = objectives.reshape(len(results), len(problem.objectives))
     objective = objectives[:, 0]
@@ -250,7 +267,21 @@ def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[in
     violation = np.array(
         [result.violation if math.isfinite(result.violation) else FAILED for result in results]
     )
-    return Outcomes(objective, constraints, objective + PENALTY * violation, objectives)
+    pieces = tuple(
+        np.array([_objective_pieces(goal, result, size) for result in results]).reshape(len(results), size)
+        for goal, size in zip(
+            problem.objectives, objective_sizes or (1,) * len(problem.objectives), strict=True
+        )
+    )
+    return Outcomes(objective, constraints, objective + PENALTY * violation, objectives, pieces)
+
+
+def _objective_pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:
+    """Values of which the greatest is the objective; its own one ``size`` times where there are no such."""
+    value = _minimised(goal, result)
+    sign = (1.0 if goal.sense == "minimize" else -1.0) / goal.metric.scale
+    pieces = tuple(sign * piece for piece in result.pieces.get(goal.label, ()))
+    return pieces if len(pieces) == size and max(pieces) == value else (value,) * size
 
 
 def _pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:
