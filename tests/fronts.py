@@ -57,7 +57,7 @@ class FrontMemo:
     def objective_count(self) -> int:
         return self.case.objectives
 
-    def in_pieces(self, point: FloatArray) -> FrontMemo:
+    def in_pieces(self) -> FrontMemo:
         return self
 
     def evaluate(self, points: FloatArray) -> Outcomes:
@@ -70,7 +70,8 @@ class FrontMemo:
         objectives = np.array([values for values, _ in results]).reshape(len(points), -1)
         constraints = np.array([slack for _, slack in results]).reshape(len(points), self.case.constraints)
         pieces = tuple(column[:, None] for column in objectives.T)
-        return Outcomes(objectives[:, 0], constraints, objectives[:, 0], objectives, pieces)
+        first = objectives[:, 0]
+        return Outcomes(first, constraints, first, objectives=objectives, objective_pieces=pieces)
 
     def _value(self, point: FloatArray) -> Values:
         design = point.copy()

@@ -259,7 +259,8 @@ def test_pieces_of_objectives_have_the_objective_as_their_greatest(cube: Problem
     points = np.vstack(
         [serving, np.clip(serving + 0.03 * rng.standard_normal((30, view.dimension)), 0.0, 1.0)]
     )
-    plain, pieces = view.evaluate(points), view.in_pieces(serving).evaluate(points)
+    plain = view.evaluate(points)
+    pieces = view.in_pieces().evaluate(points)
     assert [values.shape[1] for values in plain.objective_pieces] == [1, 1]
     assert [values.shape[1] for values in pieces.objective_pieces] == [1, 8]
     assert pieces.constraints.shape[1] == 32

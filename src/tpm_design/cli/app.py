@@ -30,6 +30,13 @@ AllowCode = Annotated[
         "--allow-code", help="Run the Python file that a study names as its mechanism; read it first."
     ),
 ]
+Dask = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS|local",
+        help="Evaluate on the Dask cluster of this scheduler, or on processes of this machine.",
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print results only, no progress.")]
 
 
@@ -149,7 +156,11 @@ def optimize(
     study: Study,
     seed: Annotated[int | None, typer.Option(help="Seed of random methods, instead of the study's.")] = None,
     budget: Annotated[int | None, typer.Option(help="Number of evaluations, instead of the study's.")] = None,
-    workers: Annotated[int | None, typer.Option(help="Threads; one per processor if left out.")] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Threads, with --dask local processes; one per processor if left out."),
+    ] = None,
+    dask: Dask = None,
     resume: Annotated[
         str | None,
         typer.Option(
@@ -167,7 +178,16 @@ def optimize(
     from tpm_design.cli.commands import optimize_one
 
     return optimize_one(
-        study, seed, budget, workers, resume, output, allow_code=allow_code, as_json=as_json, quiet=quiet
+        study,
+        seed,
+        budget,
+        workers,
+        dask,
+        resume,
+        output,
+        allow_code=allow_code,
+        as_json=as_json,
+        quiet=quiet,
     )
 
 
@@ -178,7 +198,19 @@ def sweep(
     shard: Annotated[
         str, typer.Option(metavar="I/N", help="Every N-th point, from the I-th; `merge` joins the shards.")
     ] = "1/1",
-    workers: Annotated[int | None, typer.Option(help="Threads; one per processor if left out.")] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Threads, with --dask local processes; one per processor if left out."),
+    ] = None,
+    dask: Dask = None,
+    resume: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RUN|latest",
+            help="Go on in this run folder, or in the newest one of the same shard: after an interruption, a "
+            "crash or a full disk.",
+        ),
+    ] = None,
     output: Annotated[Path, typer.Option(metavar="DIR", help="Folder for run folders.")] = Path("results"),
     allow_code: AllowCode = False,
     as_json: Json = False,
@@ -187,7 +219,9 @@ def sweep(
     """Evaluate every design of the study's `sweep:`; the run is written below results/."""
     from tpm_design.cli.sweep import sweep_one
 
-    return sweep_one(study, shard, workers, output, allow_code=allow_code, as_json=as_json, quiet=quiet)
+    return sweep_one(
+        study, shard, workers, dask, resume, output, allow_code=allow_code, as_json=as_json, quiet=quiet
+    )
 
 
 @app.command()
@@ -246,6 +280,54 @@ def certify(
         settings or [],
         max_tolerance,
         check,
+        output,
+        workers,
+        allow_code=allow_code,
+        as_json=as_json,
+        quiet=quiet,
+    )
+
+
+@app.command()
+@guarded
+def inscribe(
+    study: Annotated[Path, typer.Argument(metavar="STUDY|RUN", help="Study file or run folder.")],
+    body: Annotated[str, typer.Option(help="box, sphere, cylinder (axis along z) or ellipsoid.")],
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Value in the study's units; may be repeated."),
+    ] = None,
+    margin: Annotated[
+        float, typer.Option(help="Least distance of every determinant from 0, dimensionless.")
+    ] = 0.0,
+    proportions: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="Proportions of the sizes along x, y and z; free if left out."),
+    ] = None,
+    certify: Annotated[
+        bool, typer.Option("--certify", help="Shrink it until it is proved; writes a certificate.")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The certificate, instead of ./certificate.json.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Threads of the proof; one per processor if left out.")
+    ] = None,
+    allow_code: AllowCode = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int | None:
+    """Find the largest body in the singularity-free region of one design: within reach and joint limits of
+    the mode, in any of its aspects. The study's own region and constraints play no part."""
+    from tpm_design.cli.inscribe import inscribe_one
+
+    return inscribe_one(
+        study,
+        settings or [],
+        body,
+        margin,
+        proportions,
+        certify,
         output,
         workers,
         allow_code=allow_code,

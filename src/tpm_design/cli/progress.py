@@ -71,7 +71,8 @@ class _Best:
             self._feasible = min(self._feasible, minimised(self._problem, entry.evaluation))
             if len(self._problem.objectives) > 1:
                 self._front = front_entries(self._problem, [*self._front, entry])
-        self._violation = min(self._violation, entry.evaluation.violation)
+        if entry.evaluation.status != "aborted":
+            self._violation = min(self._violation, entry.evaluation.violation)
         before = f"round {self._round}: " if self._round > 1 else ""
         if self._front:
             return f"front of {len(self._front)}"

@@ -25,12 +25,15 @@ class Stalled(Exception):  # noqa: N818 - an ordinary end of a search, not an er
 class Outcomes:
     """Values at N points: ``objective`` (N,) to minimise, ``constraints`` (N, m) met where ≥ 0 (each
     divided by its metric's scale), ``merit`` (N,) = objective + exact penalty, finite everywhere.
+    ``aborted`` (N,), or empty for none: points that a ``ScreeningSearch`` did not measure to the end. What is
+    not known of them is 0 of a constraint, and their merit is behind those that were asked for.
     Of a ``FrontSearch``: ``objectives`` (N, k), all of them, each to minimise, and ``objective_pieces``: for
     each of them an array (N, s) whose greatest value it is, smoother in the design."""
 
     objective: FloatArray
     constraints: FloatArray
     merit: FloatArray
+    aborted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     objectives: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     objective_pieces: tuple[FloatArray, ...] = ()
 
@@ -57,15 +60,24 @@ class Search(Protocol):
 
 
 @runtime_checkable
+class ScreeningSearch(Search, Protocol):
+    """A search that need not measure everything of points that are not among the best."""
+
+    def screen(self, points: FloatArray, keep: int) -> Outcomes:
+        """As ``evaluate``; only the ``keep`` best of ``points``, by violation and then by objective, are sure
+        to be measured to the end. Raises BudgetSpent."""
+        ...
+
+
+@runtime_checkable
 class FrontSearch(Search, Protocol):
     """A search that tells all its objectives."""
 
     @property
     def objective_count(self) -> int: ...
 
-    def in_pieces(self, point: FloatArray) -> FrontSearch:
-        """The same search, constraints and objectives in as many pieces as a point (n,) has of each. Raises
-        BudgetSpent."""
+    def in_pieces(self) -> FrontSearch:
+        """The same search, constraints and objectives in as many pieces as a known point has of each."""
         ...
 
 

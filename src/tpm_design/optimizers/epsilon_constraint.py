@@ -50,8 +50,9 @@ def epsilon_constraint(watch: Watch, seed: int) -> str:
     objective_count(watch)
     known = _Known(watch)
     known.survey()
-    # a design that serves the region: metrics over the region have all their pieces there
-    known.see_pieces(_extreme(known, 0))
+    # at a design that serves the region metrics over the region have all their pieces
+    _extreme(known, 0)
+    known.see_pieces()
     first = _extreme(known, 0)
     second = _extreme(known, 1)
     width = np.abs(known.objectives(second) - known.objectives(first))
@@ -141,9 +142,9 @@ class _Known:
         spread = (0.5 + np.outer(np.arange(1, SURVEY * size + 1), steps)) % 1.0
         self._evaluate(np.vstack([self._watch.start, spread]))
 
-    def see_pieces(self, number: int) -> None:
-        """From here on constraints and objectives in as many pieces as this point has; numbers stay."""
-        self._watch.see_pieces(self._points[number])
+    def see_pieces(self) -> None:
+        """From here on constraints and objectives in as many pieces as a known point has; numbers stay."""
+        self._watch.see_pieces()
         points = np.array(self._points)
         for values in (self._points, self._objectives, self._slacks, self._pieces, self._numbers):
             values.clear()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tpm_design.errors import RefusedError
-from tpm_design.optimizers.base import FloatArray, FrontSearch, Outcomes, Search, Stalled
+from tpm_design.optimizers.base import FloatArray, FrontSearch, Outcomes, ScreeningSearch, Search, Stalled
 
 LOCAL_STEP = 0.05
 """First step of local methods, as a share of each variable's range: chosen on constrained problems in seven
@@ -62,6 +62,16 @@ class Watch:
 
         Raises whatever ended the search first, again at every later call.
         """
+        return self._asked(points, self.search.evaluate)
+
+    def screen(self, points: FloatArray, keep: int) -> Outcomes:
+        """As ``evaluate``, the ``keep`` best of them to the end; all where the search cannot screen."""
+        search = self.search
+        if not isinstance(search, ScreeningSearch):
+            return self.evaluate(points)
+        return self._asked(points, lambda inside: search.screen(inside, keep))
+
+    def _asked(self, points: FloatArray, ask: Callable[[FloatArray], Outcomes]) -> Outcomes:
         if self.stopped is not None:
             raise self.stopped
         try:
@@ -70,7 +80,7 @@ class Watch:
             if np.isnan(inside).any():
                 raise Stalled("The method broke down: it asked for a point that is not a number.")
             self._note(inside)
-            return self.search.evaluate(inside)
+            return ask(inside)
         except BaseException as reason:
             self.stopped = reason
             raise
@@ -111,10 +121,10 @@ class Watch:
             jacobian=((constraints[1 : 1 + size] - constraints[1 + size :]) / width[:, None]).T,
         )
 
-    def see_pieces(self, point: FloatArray) -> None:
-        """From here on constraints and objectives in as many pieces as a known point (n,) has of each."""
+    def see_pieces(self) -> None:
+        """From here on constraints and objectives in as many pieces as a known point has of each."""
         if isinstance(self.search, FrontSearch):
-            self.search = self.search.in_pieces(point)
+            self.search = self.search.in_pieces()
             self.constraint_count = self.search.constraint_count
 
     def _note(self, points: FloatArray) -> None:

@@ -280,12 +280,14 @@ def _search(reported: Reported) -> list[str]:
     polish = f", polished by {code(settings.polish)}" if settings.polish else ""
     feasible = sum(entry.evaluation.status == "feasible" for entry in entries)
     failed = sum(entry.evaluation.status == "failed" for entry in entries)
+    ended_early = sum(entry.evaluation.status == "aborted" for entry in entries)
+    aborted = f", {ended_early} ended early, sure to be worse than others" if ended_early else ""
     lines = [
         "## How it was found",
         "",
         f"- method: {code(settings.method)}{polish}",
         f"- seed {settings.seed}, budget {settings.budget} evaluations",
-        f"- {len(entries)} evaluations: {feasible} feasible, {failed} failed",
+        f"- {len(entries)} evaluations: {feasible} feasible, {failed} failed{aborted}",
         *_rounds(entries),
         f"- {_time(reported)}",
     ]

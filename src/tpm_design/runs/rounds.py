@@ -13,7 +13,9 @@ from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.optimizers import optimizer
 from tpm_design.optimizers.base import BudgetSpent
-from tpm_design.problem import Goal, Problem, Sample
+from tpm_design.problem import Design, Goal, Problem, Sample
+from tpm_design.runs.executors import Executor
+from tpm_design.runs.optima import distinct_optima
 from tpm_design.runs.optimize import (
     Round,
     SearchPlan,
@@ -24,6 +26,7 @@ from tpm_design.runs.optimize import (
     remarks_on,
     run_method,
     search_all,
+    space_of,
     status_sentence,
     view_of,
 )
@@ -65,6 +68,7 @@ def search_certified(
     workers: int,
     record: Callable[[Entry], None],
     stored: Sequence[Entry] = (),
+    executor: Executor | None = None,
 ) -> SearchResult:
     """Search and certify in rounds, until the best design is proved, no round can help or the budget ends.
 
@@ -74,10 +78,11 @@ def search_certified(
 
     ``stored``: the log of an earlier search for the same problem; a design that is asked for again and judged
     by the same samples is answered from it, verdicts are found anew. With another budget the rounds are
-    other ones: what they do not ask for is dropped at the end.
+    other ones: what they do not ask for is dropped at the end. ``executor``: who evaluates, ``workers``
+    threads if None; these prove in any case.
     """
     check_plan(problem, plan)
-    course = _Course(problem, plan, proving, workers, record, answers_in(stored))
+    course = _Course(problem, plan, proving, workers, record, answers_in(stored), executor)
     try:
         ending, detail = course.run()
     except KeyboardInterrupt:
@@ -97,6 +102,7 @@ def search_certified(
         remarks_on(plan, problem),
         tuple(course.rounds),
         found,
+        optima=distinct_optima(problem, space_of(problem), best, entries, course.optima),
     )
 
 
@@ -111,14 +117,16 @@ class _Course:
         workers: int,
         record: Callable[[Entry], None],
         answers: Answers,
+        executor: Executor | None,
     ) -> None:
         self._problem, self._plan, self._proving, self._workers = problem, plan, proving, workers
-        self._record, self._answers = record, answers
+        self._record, self._answers, self._executor = record, answers, executor
         self._samples: tuple[Sample, ...] = ()
         self._first = 0
         self.entries: list[Entry] = []
         self.rounds: list[Round] = []
         self.verdicts: dict[int, Verdict] = {}
+        self.optima: list[Design] = []
 
     def run(self) -> tuple[str, str]:
         """All rounds: the ending and a sentence on it."""
@@ -165,6 +173,7 @@ class _Course:
             first=self._first,
             round_number=len(self.rounds) + 1,
             answers=self._answers,
+            executor=self._executor,
         )
         try:
             if not self.rounds:
@@ -182,6 +191,7 @@ class _Course:
         finally:
             log.close()
             self.entries += log.entries
+            self.optima += log.optima
 
     def _start_again(self, log: EvaluationLog, limit: int) -> None:
         """Judge the best entries of the round before by all samples."""
@@ -199,7 +209,7 @@ class _Course:
 
 def starting_entries(problem: Problem, entries: Sequence[Entry], most: int) -> list[Entry]:
     """The best entry of each choice of the discrete variables, best first, then the next best of all."""
-    space = view_of(EvaluationLog(problem, workers=1), 1).space
+    space = space_of(problem)
     ordered = sorted(entries, key=lambda entry: rank(problem, entry))
     firsts = {discrete_choice(space, entry): entry for entry in reversed(ordered)}
     chosen = [entry for entry in ordered if firsts[discrete_choice(space, entry)] is entry]

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
+from tpm_design.design_space import spans
 from tpm_design.errors import did_you_mean
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.optimizers import default_method
@@ -28,16 +29,15 @@ from tpm_design.study.model import (
 )
 from tpm_design.study.plain import plain
 from tpm_design.study.plug_in import PlugIn, read_plug_in
-from tpm_design.study.quantities import interval
 from tpm_design.study.region import check_form, read_region
 from tpm_design.study.registries import Registries, registries
+from tpm_design.study.relations import check_ratios, read_ties
 from tpm_design.study.space import (
     free_center,
     read_center,
     read_limits,
     read_mode,
     read_parameters,
-    read_ties,
 )
 from tpm_design.study.study import Certification, OptimizerSettings, Study
 from tpm_design.study.sweep import SweepReader
@@ -70,13 +70,14 @@ def resolve(document: Document, model: StudyModel, known: Registries, *, allow_c
         check_form(region.type, kind, faults)
     center = region.center if region else None
     parameters = read_parameters(model.mechanism, kind, units, faults)
+    check_ratios(model.mechanism, kind, parameters, faults)
     ties = read_ties(model.mechanism, kind, parameters, faults)
     limits = read_limits(model.mechanism.limits, kind, units, faults)
     certification = _certification(model.certify, kind, units, faults)
     optimizer = _optimizer(model.optimizer, len(model.objectives), known.optimizers, faults)
     faults.raise_if_any()  # the modes and the centre's bounds follow from the parameters
 
-    ranges = {name: interval(quantity) for name, quantity in parameters.items()}
+    ranges = spans(parameters)
     ranges |= {name: ranges[source] for name, source in ties.items()}
     modes = read_mode(model.mechanism.mode, kind, ranges, _isotropic(model), faults)
     quantities = dict(parameters)
