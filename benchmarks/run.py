@@ -9,7 +9,18 @@ from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 
-NAMES = ("startup", "mechanisms", "enclosures", "volume", "certified_volume", "certificate", "sweep", "study")
+NAMES = (
+    "startup",
+    "mechanisms",
+    "enclosures",
+    "volume",
+    "certified_volume",
+    "certificate",
+    "screening",
+    "sweep",
+    "cluster",
+    "study",
+)
 
 
 def main() -> None:

@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from row import Row
-from tpm_design.cli.commands import SWITCH_INTERVAL
 from tpm_design.problem import Problem
+from tpm_design.runs.executors import SWITCH_INTERVAL
 from tpm_design.runs.sweeps import Point, sweep
 from tpm_design.study import SampleSweep, load_study
 from tpm_design.study.sweep_points import sweep_points

@@ -30,6 +30,13 @@ AllowCode = Annotated[
         "--allow-code", help="Run the Python file that a study names as its mechanism; read it first."
     ),
 ]
+Dask = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS|local",
+        help="Evaluate on the Dask cluster of this scheduler, or on processes of this machine.",
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print results only, no progress.")]
 
 
@@ -149,7 +156,11 @@ def optimize(
     study: Study,
     seed: Annotated[int | None, typer.Option(help="Seed of random methods, instead of the study's.")] = None,
     budget: Annotated[int | None, typer.Option(help="Number of evaluations, instead of the study's.")] = None,
-    workers: Annotated[int | None, typer.Option(help="Threads; one per processor if left out.")] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Threads, with --dask local processes; one per processor if left out."),
+    ] = None,
+    dask: Dask = None,
     resume: Annotated[
         str | None,
         typer.Option(
@@ -167,7 +178,16 @@ def optimize(
     from tpm_design.cli.commands import optimize_one
 
     return optimize_one(
-        study, seed, budget, workers, resume, output, allow_code=allow_code, as_json=as_json, quiet=quiet
+        study,
+        seed,
+        budget,
+        workers,
+        dask,
+        resume,
+        output,
+        allow_code=allow_code,
+        as_json=as_json,
+        quiet=quiet,
     )
 
 
@@ -178,7 +198,19 @@ def sweep(
     shard: Annotated[
         str, typer.Option(metavar="I/N", help="Every N-th point, from the I-th; `merge` joins the shards.")
     ] = "1/1",
-    workers: Annotated[int | None, typer.Option(help="Threads; one per processor if left out.")] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Threads, with --dask local processes; one per processor if left out."),
+    ] = None,
+    dask: Dask = None,
+    resume: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RUN|latest",
+            help="Go on in this run folder, or in the newest one of the same shard: after an interruption, a "
+            "crash or a full disk.",
+        ),
+    ] = None,
     output: Annotated[Path, typer.Option(metavar="DIR", help="Folder for run folders.")] = Path("results"),
     allow_code: AllowCode = False,
     as_json: Json = False,
@@ -187,7 +219,9 @@ def sweep(
     """Evaluate every design of the study's `sweep:`; the run is written below results/."""
     from tpm_design.cli.sweep import sweep_one
 
-    return sweep_one(study, shard, workers, output, allow_code=allow_code, as_json=as_json, quiet=quiet)
+    return sweep_one(
+        study, shard, workers, dask, resume, output, allow_code=allow_code, as_json=as_json, quiet=quiet
+    )
 
 
 @app.command()

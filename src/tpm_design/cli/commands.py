@@ -12,14 +12,18 @@ from pathlib import Path
 from typing import Any
 
 from tpm_design.cli.comparison import comparison_text, worst_code, write_comparison
+from tpm_design.cli.evaluators import check_dask, evaluators
+from tpm_design.cli.front import front_data, front_text
 from tpm_design.cli.guard import INTERRUPTED, NOT_PROVED, NOTHING_FEASIBLE
 from tpm_design.cli.progress import search_progress
 from tpm_design.cli.results import design_rows, evaluation_data, limit_text, result_text
 from tpm_design.cli.text import table
+from tpm_design.design_space import with_changes
 from tpm_design.errors import UsageError
 from tpm_design.mechanisms import mechanism_kind
-from tpm_design.problem import Design, evaluate, with_ties
+from tpm_design.problem import Design, evaluate
 from tpm_design.report.words import gap_text, pose_text, pose_unit_names
+from tpm_design.runs.executors import SWITCH_INTERVAL, Executor
 from tpm_design.runs.folder import STUDY, newest_run, read_run
 from tpm_design.runs.optimality import gap_of
 from tpm_design.runs.optimize import check_plan
@@ -37,7 +41,6 @@ from tpm_design.study.actions import Run, optimize_study, plan_of, pose_values
 from tpm_design.study.resuming import LATEST, check_resumable, run_to_resume
 
 RESULTS = Path("results")
-SWITCH_INTERVAL = 1e-4
 
 
 def init_study(name: str, mechanism: str) -> int | None:
@@ -67,7 +70,7 @@ def validate_study(path: Path, *, resolved: bool, allow_code: bool, quiet: bool)
             print(f"{path} is valid: {', '.join(comparison.studies)}, asked the same.")
         return None
     study = load_study(path, allow_code=allow_code)
-    if study.problem.variables and len(study.problem.objectives) == 1:
+    if study.problem.variables:
         check_plan(study.problem, plan_of(study))
     if resolved:
         print(dump_yaml(study.resolved()), end="")
@@ -109,8 +112,7 @@ def chosen_design(
     design, assumptions = choose_design(study, given)
     if stored is None:
         return study, design, assumptions
-    changed = {**stored, **{name: design[name] for name in given}}
-    return study, with_ties(study.problem.ties, changed), ()
+    return study, with_changes(study.problem, stored, {name: design[name] for name in given}), ()
 
 
 def evaluate_one(
@@ -223,6 +225,7 @@ def optimize_one(
     seed: int | None,
     budget: int | None,
     workers: int | None,
+    dask: str | None,
     resume: str | None,
     output: Path,
     *,
@@ -235,22 +238,28 @@ def optimize_one(
     if comparison is None:
         study = load_study(path, allow_code=allow_code).searched_with(seed=seed, budget=budget)
         folder = None if resume is None else run_to_resume(study, resume, output)
-        run = _searched(study, threads, output, folder, quiet=quiet or as_json)
+        _check_search(study, folder)
+        check_dask(dask, workers, [study])
+        with evaluators(dask, threads) as executor:
+            run = _searched(study, threads, executor, output, folder, quiet=quiet or as_json)
         print(json.dumps(_run_data(study, run), ensure_ascii=False) if as_json else _run_text(study, run))
         return _ending(run)
     studies = {
         label: study.searched_with(seed=seed, budget=budget) for label, study in comparison.studies.items()
     }
     folders = _runs_to_resume(studies, resume, output)
-    for study in studies.values():
-        check_plan(study.problem, plan_of(study))
-    runs = {}
     for label, study in studies.items():
-        if not (quiet or as_json):
-            print(f"{label}: {study.problem.kind.title}", file=sys.stderr)
-        runs[label] = _searched(study, threads, output, folders.get(label), quiet=quiet or as_json)
-        if runs[label].result.ending == "interrupted":
-            break
+        _check_search(study, folders.get(label))
+    check_dask(dask, workers, studies.values())
+    runs = {}
+    with evaluators(dask, threads) as executor:
+        for label, study in studies.items():
+            if not (quiet or as_json):
+                print(f"{label}: {study.problem.kind.title}", file=sys.stderr)
+            folder = folders.get(label)
+            runs[label] = _searched(study, threads, executor, output, folder, quiet=quiet or as_json)
+            if runs[label].result.ending == "interrupted":
+                break
     if as_json:
         data = {label: _run_data(studies[label], run) for label, run in runs.items()}
         print(json.dumps({"comparison": comparison.name, "architectures": data}, ensure_ascii=False))
@@ -278,17 +287,23 @@ def _runs_to_resume(studies: Mapping[str, Study], resume: str | None, output: Pa
     for label, study in studies.items():
         with suppress(UsageError):
             folders[label] = run_to_resume(study, resume, output)
-    for label, folder in folders.items():
-        check_resumable(studies[label], folder)
     return folders
 
 
-def _searched(study: Study, workers: int, output: Path, resume: Path | None, *, quiet: bool) -> Run:
+def _check_search(study: Study, resume: Path | None) -> None:
+    """Refuse what cannot work before anything is started."""
     check_plan(study.problem, plan_of(study))
     if resume is not None:
         check_resumable(study, resume)
+
+
+def _searched(
+    study: Study, workers: int, executor: Executor | None, output: Path, resume: Path | None, *, quiet: bool
+) -> Run:
     with search_progress(study.problem, study.units, study.optimizer.budget, quiet=quiet) as watch:
-        return optimize_study(study, workers=workers, output=output, watch=watch, resume=resume)
+        return optimize_study(
+            study, workers=workers, output=output, watch=watch, resume=resume, executor=executor
+        )
 
 
 def _run_data(study: Study, run: Run) -> dict[str, Any]:
@@ -297,6 +312,8 @@ def _run_data(study: Study, run: Run) -> dict[str, Any]:
     data: dict[str, Any] = {"study": study.name, "run": str(run.folder), "status": run.status}
     if run.best is not None:
         data["best"] = evaluation_data(study.problem, study.units, run.best)
+    if len(study.problem.objectives) > 1:
+        data["front"] = front_data(study.problem, study.units, run.result.front)
     if run.result.bound is not None and run.result.bound.reachable:
         least = study.units.from_si(run.result.bound.least, "m")
         data["bound"] = {"value": least, "unit": study.units.name("m"), "gap": gap_of(run.result)}
@@ -309,6 +326,8 @@ def _run_text(study: Study, run: Run) -> str:
     from tpm_design.cli.certify import verdict_text
 
     parts = []
+    if run.result.front:
+        parts += [front_text(study.problem, study.units, run.result.front), "The knee:"]
     if run.best is not None and run.result.best is not None:
         parts += [
             result_text(study.problem, study.units, run.best),
@@ -349,7 +368,6 @@ def worker_threads(workers: int | None) -> int:
         raise UsageError(
             f"{workers} workers cannot work.", where="--workers", remedy="Choose a whole number from 1."
         )
-    # short compiled calls by several threads: the usual 5 ms would make them wait for one another
     sys.setswitchinterval(SWITCH_INTERVAL)
     return workers or usable_processors()
 

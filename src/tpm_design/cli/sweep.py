@@ -10,17 +10,19 @@ from pathlib import Path
 from typing import Any
 
 from tpm_design.cli.commands import worker_threads
+from tpm_design.cli.evaluators import check_dask, evaluators
 from tpm_design.cli.guard import INTERNAL, INTERRUPTED, POINTS_FAILED, complain
 from tpm_design.cli.progress import sweep_progress
 from tpm_design.cli.results import NO_VALUE, evaluation_data
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
 from tpm_design.problem import Goal
-from tpm_design.runs.folder import TABLE
+from tpm_design.runs.folder import STUDY, TABLE
 from tpm_design.runs.search import Entry
-from tpm_design.runs.sweeps import Shard, failures
+from tpm_design.runs.sweeps import WHOLE, Shard, failures
 from tpm_design.runs.tables import goal_unit
 from tpm_design.study import Study, load_study
+from tpm_design.study.resuming import check_resumable, run_to_resume
 from tpm_design.study.sweep_points import held_values, sweep_points
 from tpm_design.study.sweeping import SweepRun, merge_runs, sweep_study
 
@@ -31,6 +33,8 @@ def sweep_one(
     path: Path,
     shard: str,
     workers: int | None,
+    dask: str | None,
+    resume: str | None,
     output: Path,
     *,
     allow_code: bool,
@@ -39,17 +43,32 @@ def sweep_one(
 ) -> int | None:
     part, threads = _shard(shard), worker_threads(workers)
     study = load_study(path, allow_code=allow_code)
-    held = held_values(study)
+    folder = None if resume is None else run_to_resume(study, resume, output, part)
+    if folder is not None:
+        check_resumable(study, folder, part)
+    check_dask(dask, workers, [study])
+    held, count = held_values(study), len(sweep_points(study, part))
     if held and not (quiet or as_json):
         print("Held: " + "; ".join(held) + ".\n")
-    with sweep_progress(len(sweep_points(study, part)), quiet=quiet or as_json) as watch:
-        run = sweep_study(study, shard=part, workers=threads, output=output, watch=watch)
-    return _told(study, run, as_json=as_json)
+    with (
+        evaluators(dask, threads) as executor,
+        sweep_progress(count, quiet=quiet or as_json) as watch,
+    ):
+        run = sweep_study(
+            study,
+            shard=part,
+            workers=threads,
+            output=output,
+            watch=watch,
+            resume=folder,
+            executor=executor,
+        )
+    return _told(study, run, part, as_json=as_json)
 
 
 def merge_shards(runs: Sequence[Path], output: Path, *, allow_code: bool, as_json: bool) -> int | None:
     study, run = merge_runs(runs, output=output, allow_code=allow_code)
-    return _told(study, run, as_json=as_json)
+    return _told(study, run, WHOLE, as_json=as_json)
 
 
 def _shard(text: str) -> Shard:
@@ -59,10 +78,10 @@ def _shard(text: str) -> Shard:
     return Shard(int(numbers[1]), int(numbers[2]))
 
 
-def _told(study: Study, run: SweepRun, *, as_json: bool) -> int | None:
+def _told(study: Study, run: SweepRun, shard: Shard, *, as_json: bool) -> int | None:
     """Print how a sweep ended; its exit code."""
     result = run.result
-    print(json.dumps(_data(study, run), ensure_ascii=False) if as_json else _text(study, run))
+    print(json.dumps(_data(study, run), ensure_ascii=False) if as_json else _text(study, run, shard))
     if result.ending == "interrupted":
         return INTERRUPTED
     if result.faults:
@@ -92,7 +111,7 @@ def _data(study: Study, run: SweepRun) -> dict[str, Any]:
     return data
 
 
-def _text(study: Study, run: SweepRun) -> str:
+def _text(study: Study, run: SweepRun, shard: Shard) -> str:
     entries = run.result.entries
     problem = study.problem
     goals = (*problem.objectives, *problem.constraints, *problem.record)
@@ -100,10 +119,18 @@ def _text(study: Study, run: SweepRun) -> str:
     parts = [table(["metric", "least", "at point", "greatest", "at point", "without value"], rows)]
     parts += _failure_lines(entries)
     allow = " --allow-code" if study.plug_in else ""
-    lines = [run.status, f"Run: {run.folder}", f"Next: tpm-design report {run.folder}{allow}"]
+    lines = [run.status, f"Run: {run.folder}", f"Next: tpm-design {_following(run, shard)}{allow}"]
     if run.best is not None and run.best.evaluation.status == "feasible":
         lines.insert(1, f"Best feasible design: point {run.best.number}.")
     return "\n\n".join([*parts, "\n".join(lines)])
+
+
+def _following(run: SweepRun, shard: Shard) -> str:
+    """What to do next."""
+    if run.result.ending != "interrupted" or run.folder is None:
+        return f"report {run.folder}"
+    part = "" if shard == WHOLE else f" --shard {shard}"
+    return f"sweep {run.folder / STUDY} --resume {run.folder}{part}"
 
 
 def _metric_row(study: Study, entries: Sequence[Entry], goal: Goal) -> list[str]:

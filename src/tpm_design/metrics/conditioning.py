@@ -115,10 +115,10 @@ METRICS = (
     ),
     Metric(
         "conditioning_mean", "-", "maximize", 1.0, "volume mean of 1/κ (GCI)", SOURCE, _mean,
-        (NORM, DRIVE, OVER), refusal=_no_volume,
+        (NORM, DRIVE, OVER), refusal=_no_volume, cost="rays",
     ),
     Metric(
         "conditioning_share", "-", "maximize", 1.0, "share of the domain with 1/κ ≥ threshold", SOURCE,
-        _share, (NORM, DRIVE, OVER, THRESHOLD), refusal=_no_volume,
+        _share, (NORM, DRIVE, OVER, THRESHOLD), refusal=_no_volume, cost="rays",
     ),
 )  # fmt: skip

@@ -49,7 +49,7 @@ def _actuator_range(context: Context, options: Mapping[str, Any]) -> Measurement
 METRICS = (
     Metric(
         "total_link_length", "m", "minimize", 0.1, "sum over the limbs of the moving links", SOURCE,
-        _total_link_length, needs_region=False,
+        _total_link_length, needs_region=False, cost="closed form",
     ),
     Metric(
         "robot_size", "m", "minimize", 0.1,

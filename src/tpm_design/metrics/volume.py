@@ -98,19 +98,20 @@ def _point_shares(context: Context) -> tuple[float, float]:
 METRICS = (
     Metric(
         "reachable_volume", "m³", "maximize", 0.1, "volume of the mode's reachable poses", RAYS,
-        _reachable_volume, needs_region=False, refusal=of_positions,
+        _reachable_volume, needs_region=False, refusal=of_positions, cost="rays",
     ),
     Metric(
         "singularity_free_volume", "m³", "maximize", 0.1,
         "volume of the largest aspect, or of the one that holds `home`", RAYS,
-        _singularity_free_volume, (MARGIN, HOME), needs_region=False, refusal=of_positions,
+        _singularity_free_volume, (MARGIN, HOME), needs_region=False, refusal=of_positions, cost="rays",
     ),
     Metric(
         "coverage", "-", "maximize", 1.0,
         "largest share of the region that lies in one aspect; 1 when all of it does", RAYS, _coverage,
+        cost="rays",
     ),
     Metric(
         "workspace_ratio", "-", "maximize", 1.0, "singularity-free volume over robot_size³", RAYS,
-        _workspace_ratio, refusal=of_positions,
+        _workspace_ratio, refusal=of_positions, cost="rays",
     ),
 )  # fmt: skip

@@ -7,18 +7,18 @@ import json
 import math
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from tpm_design.errors import UsageError
-from tpm_design.problem import Evaluation, Problem
+from tpm_design.problem import Cutoff, Evaluation, Problem
 from tpm_design.runs.durable import AppendedLines, replace_file
-from tpm_design.runs.replay import answers_in
-from tpm_design.runs.search import Entry, design_key
+from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import EvaluationTable, csv_line, designs_table
 from tpm_design.units import Units
 
@@ -32,7 +32,7 @@ STUDY, TABLE, LOG, DESIGNS, SUMMARY = (
 UNFINISHED = "unfinished"
 """``ending`` in run.json from the start of a run until it is over."""
 
-LIBRARIES = ("tpm-design", "numpy", "scipy", "numba", "nlopt", "pandas")
+LIBRARIES = ("tpm-design", "numpy", "scipy", "numba", "nlopt", "pymoo", "pandas")
 
 
 def create_run_folder(results: Path, study_name: str, study_hash: str) -> Path:
@@ -59,8 +59,9 @@ def create_run_folder(results: Path, study_name: str, study_hash: str) -> Path:
 class RunWriter:
     """Writes a run as it happens. ``record`` hands one evaluation to both logs.
 
-    ``stored``: what the log of a run that goes on holds already. The log is only ever appended to, or
-    replaced as a whole. Everything here raises RunStoppedError where a file cannot be written.
+    ``stored``: what the log of a run that goes on holds already. ``told``: for run.json as long as the run is
+    not over. The log is only ever appended to, or replaced as a whole. Everything here raises RunStoppedError
+    where a file cannot be written.
     """
 
     def __init__(
@@ -70,13 +71,13 @@ class RunWriter:
         units: Units,
         study_text: str,
         stored: Sequence[Entry] = (),
+        told: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         self.folder = folder
         self._problem, self._units = problem, units
         self._rows = EvaluationTable(problem, units)
-        self._stored = frozenset(answers_in(stored))
         status = "The run is not over, or was cut short; --resume goes on."
-        unfinished = {"status": status, "ending": UNFINISHED, **provenance()}
+        unfinished = {"status": status, "ending": UNFINISHED, **told, **provenance()}
         replace_file(folder / STUDY, study_text)
         replace_file(folder / SUMMARY, _summary_text(unfinished))
         # what was cut short at its end is gone from here on
@@ -84,10 +85,9 @@ class RunWriter:
         self._log, self._table = AppendedLines(folder / LOG), AppendedLines(folder / TABLE)
 
     def record(self, entry: Entry) -> None:
-        """Append one evaluation, unless it is there already, and hand it to the operating system."""
-        if (entry.judged_by, design_key(entry.evaluation.design)) not in self._stored:
-            self._log.append(_log_line(entry))
-            self._table.append(csv_line(self._rows.row(entry)))
+        """Append one evaluation and hand it to the operating system."""
+        self._log.append(_log_line(entry))
+        self._table.append(csv_line(self._rows.row(entry)))
 
     def close(self) -> None:
         """Leave both logs as they are."""
@@ -125,10 +125,13 @@ def _log_line(entry: Entry) -> str:
 
 def entry_to_json(entry: Entry) -> dict[str, Any]:
     """An evaluation with exact floats; a violation without a number becomes null."""
-    data = vars(entry.evaluation) | {"design": dict(entry.evaluation.design)}
+    # a copy of everything, as asdict makes it, takes longer than all the rest
+    data = dict(vars(entry.evaluation))
     data["violation"] = data["violation"] if math.isfinite(data["violation"]) else None
     data["metrics"] = {k: v if math.isfinite(v) else None for k, v in data["metrics"].items()}
     data["errors"] = {k: v if math.isfinite(v) else None for k, v in data["errors"].items()}
+    if data["cutoff"] is None:
+        del data["cutoff"]
     judged_by = {"judged_by": entry.judged_by} if entry.judged_by else {}
     return {"id": entry.number, "round": entry.round, **judged_by, **data}
 
@@ -139,6 +142,7 @@ def entry_from_json(data: Mapping[str, Any]) -> Entry:
     fields["violation"] = math.inf if fields["violation"] is None else fields["violation"]
     for key in ("metrics", "errors"):
         fields[key] = {k: math.nan if v is None else v for k, v in fields[key].items()}
+    fields["cutoff"] = None if fields.get("cutoff") is None else Cutoff(**fields["cutoff"])
     fields["pieces"] = {label: tuple(values) for label, values in fields["pieces"].items()}
     round_number, judged_by = int(data.get("round", 1)), str(data.get("judged_by", ""))
     return Entry(int(data["id"]), Evaluation(**fields), round_number, judged_by)
@@ -210,17 +214,20 @@ def read_summary(folder: Path) -> Mapping[str, Any]:
     return data if isinstance(data, dict) else {}
 
 
-def newest_run(results: Path, study_name: str = "*") -> Path:
-    """The run folder begun last under ``results``, of any study or of one. Raises UsageError where there is
-    none."""
+def newest_run(
+    results: Path, study_name: str = "*", *, wanted: Callable[[Path], bool] = lambda folder: True
+) -> Path:
+    """The run folder begun last under ``results``, of any study or of one, among those ``wanted``. Raises
+    UsageError where there is none."""
     found = [path.parent for path in results.glob(f"{study_name}/*/{LOG}")]
-    if not found:
-        raise UsageError(
-            "There is no run here." if study_name == "*" else f"There is no run of {study_name} here.",
-            where=str(results),
-            remedy="Run `tpm-design optimize STUDY` first.",
-        )
-    return max(found, key=lambda folder: folder.name)
+    for folder in sorted(found, key=lambda folder: folder.name, reverse=True):
+        if wanted(folder):
+            return folder
+    raise UsageError(
+        "There is no run here." if study_name == "*" else f"There is no run of {study_name} here.",
+        where=str(results),
+        remedy="Run `tpm-design optimize STUDY` or `tpm-design sweep STUDY` first.",
+    )
 
 
 def provenance() -> dict[str, Any]:

@@ -13,7 +13,9 @@ from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.optimizers import optimizer
 from tpm_design.optimizers.base import BudgetSpent
-from tpm_design.problem import Goal, Problem, Sample
+from tpm_design.problem import Design, Goal, Problem, Sample
+from tpm_design.runs.executors import Executor
+from tpm_design.runs.optima import distinct_optima
 from tpm_design.runs.optimize import (
     Round,
     SearchPlan,
@@ -24,6 +26,7 @@ from tpm_design.runs.optimize import (
     remarks_on,
     run_method,
     search_all,
+    space_of,
     status_sentence,
     view_of,
 )
@@ -65,6 +68,7 @@ def search_certified(
     workers: int,
     record: Callable[[Entry], None],
     stored: Sequence[Entry] = (),
+    executor: Executor | None = None,
 ) -> SearchResult:
     """Search and certify in rounds, until the best design is proved, no round can help or the budget ends.
 
@@ -74,10 +78,11 @@ def search_certified(
 
     ``stored``: the log of an earlier search for the same problem; a design that is asked for again and judged
     by the same samples is answered from it, verdicts are found anew. With another budget the rounds are
-    other ones: what they do not ask for is dropped at the end.
+    other ones: what they do not ask for is dropped at the end. ``executor``: who evaluates, ``workers``
+    threads if None; these prove in any case.
     """
     check_plan(problem, plan)
-    course = _Course(problem, plan, proving, workers, record, answers_in(stored))
+    course = _Course(problem, plan, proving, workers, record, answers_in(stored), executor)
     try:
         ending, detail = course.run()
     except KeyboardInterrupt:
@@ -97,6 +102,7 @@ def search_certified(
         remarks_on(plan, problem),
         tuple(course.rounds),
         found,
+        optima=distinct_optima(problem, space_of(problem), best, entries, course.optima),
     )
 
 
@@ -111,14 +117,16 @@ class _Course:
         workers: int,
         record: Callable[[Entry], None],
         answers: Answers,
+        executor: Executor | None,
     ) -> None:
         self._problem, self._plan, self._proving, self._workers = problem, plan, proving, workers
-        self._record, self._answers = record, answers
+        self._record, self._answers, self._executor = record, answers, executor
         self._samples: tuple[Sample, ...] = ()
         self._first = 0
         self.entries: list[Entry] = []
         self.rounds: list[Round] = []
         self.verdicts: dict[int, Verdict] = {}
+        self.optima: list[Design] = []
 
     def run(self) -> tuple[str, str]:
         """All rounds: the ending and a sentence on it."""
@@ -165,6 +173,7 @@ class _Course:
             first=self._first,
             round_number=len(self.rounds) + 1,
             answers=self._answers,
+            executor=self._executor,
         )
         try:
             if not self.rounds:
@@ -182,6 +191,7 @@ class _Course:
         finally:
             log.close()
             self.entries += log.entries
+            self.optima += log.optima
 
     def _start_again(self, log: EvaluationLog, limit: int) -> None:
         """Judge the best entries of the round before by all samples."""
@@ -199,7 +209,7 @@ class _Course:
 
 def starting_entries(problem: Problem, entries: Sequence[Entry], most: int) -> list[Entry]:
     """The best entry of each choice of the discrete variables, best first, then the next best of all."""
-    space = view_of(EvaluationLog(problem, workers=1), 1).space
+    space = space_of(problem)
     ordered = sorted(entries, key=lambda entry: rank(problem, entry))
     firsts = {discrete_choice(space, entry): entry for entry in reversed(ordered)}
     chosen = [entry for entry in ordered if firsts[discrete_choice(space, entry)] is entry]
@@ -271,13 +281,21 @@ def _corner(
 
 
 def _told(rounds: Sequence[Round], found: Verdict | None, proving: Proving) -> list[str]:
-    """Sentences on what was proved, with a remedy where not all was."""
+    """Sentences on what was proved, and in which round, with a remedy where not all was."""
     if found is None:
         return ["Nothing was certified."]
     certified = next(r for r in reversed(rounds) if r.best is not None and r.outcome == found.outcome)
+    lines = told_of(found, proving, where=f" in round {certified.number}")
+    if found.outcome != "proved" and rounds[-1].outcome == "infeasible":
+        lines.insert(1, f"Round {rounds[-1].number} found no feasible design that holds there as well.")
+    return lines
+
+
+def told_of(found: Verdict, proving: Proving, *, where: str = "") -> list[str]:
+    """Sentences on a verdict, a remedy last where not all was proved. ``where``: in which round it was."""
     within = "within the tolerances" if any(proving.tolerance.values()) else "of exactly these dimensions"
     if found.outcome == "proved":
-        return [f"Proved in round {certified.number} for every machine {within}."]
+        return [f"Proved{where} for every machine {within}."]
     failed = [r for r in found.requirements if r.outcome == found.outcome]
     labels = ", ".join(requirement.goal.label for requirement in failed)
     lines = []
@@ -287,8 +305,6 @@ def _told(rounds: Sequence[Round], found: Verdict | None, proving: Proving) -> l
     else:
         reasons = "; ".join(f"{r.goal.label} ({r.reason})" for r in failed)
         lines.append(f"Not proved for every machine {within}: {reasons}.")
-    if rounds[-1].outcome == "infeasible":
-        lines.append(f"Round {rounds[-1].number} found no feasible design that holds there as well.")
     if not any(r.settlements for r in failed):
         return [*lines, f"Nothing here proves {labels}: record it instead of asking for it."]
     remedies = [f"raise the budget, ask for less of {labels}"]

@@ -1,4 +1,4 @@
-"""The problem as an optimiser sees it: budgeted, memoised, logged, evaluated by several threads."""
+"""The problem as an optimiser sees it: budgeted, memoised, logged, evaluated by several workers."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -15,14 +16,31 @@ from numpy.typing import NDArray
 
 from tpm_design.design_space import DesignSpace
 from tpm_design.optimizers.base import BudgetSpent, Outcomes
-from tpm_design.problem import Design, Evaluation, Goal, Problem, Sample, evaluate
+from tpm_design.problem import (
+    Cutoff,
+    Design,
+    Evaluation,
+    Goal,
+    Problem,
+    Sample,
+    evaluate,
+    is_worse,
+    scaled_objective,
+)
+from tpm_design.runs.executors import Executor, Threads, in_order
+from tpm_design.runs.front import knee, non_dominated
 from tpm_design.synthesis.bound import relaxed_designs
 
 FloatArray = NDArray[np.float64]
 Key = tuple[float | str, ...]
 
-Answers = Mapping[tuple[str, Key], Evaluation]
-"""Evaluations by what a design was judged by (as in ``Entry``) and the design's key."""
+AnswerKey = tuple[str, Key, Cutoff | None]
+Answers = Mapping[AnswerKey, Evaluation]
+"""Evaluations by what a design was judged by (as in ``Entry``), the design's key, and the cutoff at which it
+was aborted, None where it was measured to the end."""
+
+SCREENED = 32
+"""Points that are screened by one cutoff: fixed, so that the log does not depend on the number of workers."""
 
 PENALTY = 1e3
 """Weight of the violation in the merit of methods without constraints: above the multipliers that
@@ -52,7 +70,9 @@ class EvaluationLog:
     """Every distinct design evaluated so far in one round. The one place that counts evaluations.
 
     ``record`` is called with each entry, in order, as soon as it is there. ``first``: number of the first.
-    ``answers``: evaluations that need not be repeated; they count like others.
+    ``answers``: evaluations that need not be repeated; they count like others. ``executor``: who evaluates,
+    ``workers`` threads of its own if None. ``optima``: designs that the method noted as local optima.
+    ``most_pieces``: in how many pieces each constraint came, at most.
     """
 
     def __init__(
@@ -64,6 +84,7 @@ class EvaluationLog:
         first: int = 0,
         round_number: int = 1,
         answers: Answers = MappingProxyType({}),
+        executor: Executor | None = None,
     ) -> None:
         self.problem = problem
         self.judged_by = samples_digest(problem.samples)
@@ -71,17 +92,23 @@ class EvaluationLog:
         self.first = first
         self.round_number = round_number
         self.entries: list[Entry] = []
+        self.optima: tuple[Design, ...] = ()
+        self.most_pieces: dict[str, int] = {}
         self._places: dict[Key, int] = {}
         self._record = record
-        self._pool = ThreadPoolExecutor(max_workers=workers) if workers > 1 else None
+        self._executor: Executor = Threads(workers) if executor is None else executor
+        self._is_own = executor is None
 
     def close(self) -> None:
-        """End the worker threads; evaluations not begun are dropped."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
+        """End the log's own threads; evaluations not begun are dropped."""
+        if self._is_own:
+            self._executor.close()
 
-    def evaluations(self, designs: Sequence[Design], limit: int) -> list[Evaluation]:
-        """Evaluations of the designs, in order; repeated ones are answered from the log.
+    def evaluations(
+        self, designs: Sequence[Design], limit: int, cutoff: Cutoff | None = None
+    ) -> list[Evaluation]:
+        """Evaluations of the designs, in order; repeated ones are answered from the log, an aborted one only
+        where ``cutoff`` would abort it as well: else it becomes another entry.
 
         Raises BudgetSpent once the log holds ``limit`` entries and another is needed; what fits is
         evaluated and logged first.
@@ -89,23 +116,41 @@ class EvaluationLog:
         keys = [design_key(design) for design in designs]
         fresh: dict[Key, Design] = {}
         for key, design in zip(keys, designs, strict=True):
-            if key not in self._places and key not in fresh:
+            if not self._is_known(key, cutoff) and key not in fresh:
                 fresh[key] = design
         allowed = max(0, limit - len(self.entries))
         wanted = list(fresh.items())[:allowed]
-        run = map if self._pool is None else self._pool.map
-        for (key, _), result in zip(wanted, run(self._evaluation, wanted), strict=True):
-            self._places[key] = len(self.entries)
-            entry = Entry(self.first + len(self.entries), result, self.round_number, self.judged_by)
-            self.entries.append(entry)
-            self._record(entry)
+        answers = [self._answer(key, cutoff) for key, _ in wanted]
+        unanswered = [design for (_, design), answer in zip(wanted, answers, strict=True) if answer is None]
+        measured = partial(evaluate, cutoff=cutoff)
+        with closing(self._executor.as_they_end(measured, self.problem, unanswered)) as evaluated:
+            results = in_order(evaluated)
+            for (key, _), answer in zip(wanted, answers, strict=True):
+                result = answer or next(results)
+                self._places[key] = len(self.entries)
+                entry = Entry(self.first + len(self.entries), result, self.round_number, self.judged_by)
+                self.entries.append(entry)
+                for label, pieces in result.pieces.items():
+                    self.most_pieces[label] = max(len(pieces), self.most_pieces.get(label, 1))
+                self._record(entry)
         if len(wanted) < len(fresh):
             raise BudgetSpent
         return [self.entries[self._places[key]].evaluation for key in keys]
 
-    def _evaluation(self, item: tuple[Key, Design]) -> Evaluation:
-        key, design = item
-        return self._answers.get((self.judged_by, key)) or evaluate(self.problem, design)
+    def _is_known(self, key: Key, cutoff: Cutoff | None) -> bool:
+        if key not in self._places:
+            return False
+        known = self.entries[self._places[key]].evaluation
+        return known.cutoff is None or (cutoff is not None and is_worse(self.problem, known, cutoff))
+
+    def _answer(self, key: Key, cutoff: Cutoff | None) -> Evaluation | None:
+        """What an evaluation would give, if it is stored."""
+        whole = self._answers.get((self.judged_by, key, None))
+        if cutoff is None:
+            return whole
+        # one that is worse may have been measured to the end for other reasons
+        sure = whole is not None and not is_worse(self.problem, whole, cutoff)
+        return whole if sure else self._answers.get((self.judged_by, key, cutoff))
 
     def best(self) -> Entry | None:
         """As ``best_entry``."""
@@ -139,11 +184,35 @@ class UnitSearch:
     def constraint_count(self) -> int:
         return sum(self.sizes)
 
+    @property
+    def objective_count(self) -> int:
+        return len(self.log.problem.objectives)
+
     def evaluate(self, points: FloatArray) -> Outcomes:
         """Values at ``points`` (N, n). Raises BudgetSpent."""
         table = np.atleast_2d(np.asarray(points, dtype=np.float64))
         results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
         return outcomes(self.log.problem, results, self.sizes)
+
+    def screen(self, points: FloatArray, keep: int) -> Outcomes:
+        """As ``ScreeningSearch``. The cutoff of each ``SCREENED`` points is the best ``keep``-th of those
+        before them."""
+        table = np.atleast_2d(np.asarray(points, dtype=np.float64))
+        designs = [self.space.design(point) for point in table]
+        results: list[Evaluation] = []
+        for first in range(0, len(designs), SCREENED):
+            cutoff = cutoff_at(self.log.problem, results, keep)
+            results += self.log.evaluations(designs[first : first + SCREENED], self.limit, cutoff)
+        return outcomes(self.log.problem, results, self.sizes)
+
+    def in_pieces(self) -> UnitSearch:
+        """The same search, each constraint in as many smooth pieces as a design in the log had."""
+        most = self.log.most_pieces
+        return replace(self, sizes=tuple(most.get(goal.label, 1) for goal in self.log.problem.constraints))
+
+    def note_optima(self, points: FloatArray) -> None:
+        """The local optima (N, n) that the method knows by now."""
+        self.log.optima = tuple(self.space.design(point) for point in points)
 
     def relaxed_optima(self) -> FloatArray:
         """Points (N, n) of the convex relaxation's designs, see ``synthesis``. Raises RefusedError where the
@@ -163,22 +232,54 @@ class UnitSearch:
 
 
 def rank(problem: Problem, entry: Entry) -> tuple[float, float, int]:
-    """Sorts entries: feasible ones first by objective, then by violation; ties by number."""
+    """Sorts entries: feasible ones first by objective, then by violation; ties by number. Aborted ones, whose
+    violation is not known, come after those."""
     objective = minimised(problem, entry.evaluation)
     if entry.evaluation.status == "feasible":
         return (0.0, objective, entry.number)
-    return (1.0 + entry.evaluation.violation, objective, entry.number)
+    behind = FAILED if entry.evaluation.status == "aborted" else 1.0
+    return (behind + entry.evaluation.violation, objective, entry.number)
+
+
+def cutoff_at(problem: Problem, results: Sequence[Evaluation], keep: int) -> Cutoff | None:
+    """That of the ``keep``-th best of the designs that were measured to the end; None where there are fewer
+    or it failed."""
+    measured = {design_key(result.design): result for result in results if result.cutoff is None}
+    ranks = sorted((result.violation, minimised(problem, result)) for result in measured.values())
+    if len(ranks) < keep or not math.isfinite(ranks[keep - 1][0]):
+        return None
+    return Cutoff(*ranks[keep - 1])
 
 
 def best_entry(problem: Problem, entries: Iterable[Entry]) -> Entry | None:
-    """The feasible entry of least objective in the last round that has one, else the one of least violation;
-    None if there is none."""
+    """The feasible entry of least objective in the last round that has one, of several objectives the knee of
+    the front; else the one of least violation. None if there is none."""
+    if len(problem.objectives) > 1:
+        entries = tuple(entries)
+        front = front_entries(problem, entries)
+        if front:
+            return front[knee(np.array([scaled_objectives(problem, e.evaluation) for e in front]))]
 
     def key(entry: Entry) -> tuple[int, tuple[float, float, int]]:
         feasible = entry.evaluation.status == "feasible"
         return (-entry.round if feasible else 0, rank(problem, entry))
 
     return min(entries, key=key, default=None)
+
+
+def answer_key(entry: Entry) -> AnswerKey:
+    """What an entry answers."""
+    return entry.judged_by, design_key(entry.evaluation.design), entry.evaluation.cutoff
+
+
+def front_entries(problem: Problem, entries: Iterable[Entry]) -> list[Entry]:
+    """The feasible entries that no other one betters in all objectives, best first by the first objective. Of
+    entries that are equal in all of them the first."""
+    feasible = [entry for entry in entries if entry.evaluation.status == "feasible"]
+    if not feasible:
+        return []
+    values = np.array([scaled_objectives(problem, entry.evaluation) for entry in feasible])
+    return [feasible[row] for row in non_dominated(values)]
 
 
 def design_key(design: Design) -> Key:
@@ -196,17 +297,28 @@ def samples_digest(samples: Sequence[Sample]) -> str:
 
 def minimised(problem: Problem, evaluation: Evaluation) -> float:
     """The first objective over its scale, turned so that less is better; FAILED where there is none."""
-    goal = problem.objectives[0]
+    return scaled_objectives(problem, evaluation)[0]
+
+
+def scaled_objectives(problem: Problem, evaluation: Evaluation) -> tuple[float, ...]:
+    """Every objective over its scale, turned so that less is better; FAILED where there is none."""
+    return tuple(_minimised(goal, evaluation) for goal in problem.objectives)
+
+
+def _minimised(goal: Goal, evaluation: Evaluation) -> float:
     value = evaluation.metrics.get(goal.label, math.nan)
     if not math.isfinite(value):
         return FAILED
-    return (value if goal.sense == "minimize" else -value) / goal.metric.scale
+    return scaled_objective(goal, value)
 
 
 def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[int]) -> Outcomes:
     """What an optimiser gets to see, finite everywhere. ``sizes``: number of pieces of each constraint; a
-    constraint of fewer pieces repeats its least."""
-    objective = np.array([minimised(problem, result) for result in results])
+    constraint of fewer pieces repeats its least. Of aborted evaluations constraints that were not measured
+    are 0, and the merit is behind that of the cutoff."""
+    objectives = np.array([scaled_objectives(problem, result) for result in results])
+    objectives = objectives.reshape(len(results), len(problem.objectives))
+    objective = objectives[:, 0]
     constraints = np.array(
         [
             [
@@ -220,9 +332,12 @@ def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[in
     violation = np.array(
         [result.violation if math.isfinite(result.violation) else FAILED for result in results]
     )
-    return Outcomes(objective, constraints, objective + PENALTY * violation)
+    aborted = np.array([result.cutoff is not None for result in results], dtype=np.bool_)
+    merit = np.where(aborted, FAILED, objective) + PENALTY * violation
+    return Outcomes(objective, constraints, merit, aborted, objectives)
 
 
 def _pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:
-    pieces = result.pieces.get(goal.label, (-FAILED * goal.metric.scale,))
+    unknown = BACKOFF if result.cutoff is not None else -FAILED
+    pieces = result.pieces.get(goal.label, (unknown * goal.metric.scale,))
     return pieces if len(pieces) == size else (min(pieces),) * size

@@ -5,22 +5,20 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, as_completed, wait
-from contextlib import closing
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from typing import Literal
 
 from tpm_design.errors import UsageError
 from tpm_design.problem import Design, Evaluation, Problem, evaluate
+from tpm_design.runs.executors import Executor, Threads
 from tpm_design.runs.folder import entry_to_json
 from tpm_design.runs.search import Entry
+from tpm_design.runs.shipping import portable
 
 REPEATED_EVERY = 19
 """Points 0, 19, 38, … are evaluated a second time. A prime, so that shards share them evenly."""
-
-AHEAD = 2
-"""Points handed to the threads at a time, for each of them: what is written lags behind by no more."""
 
 LONGEST_REASON = 300
 
@@ -79,34 +77,49 @@ class Failure:
 
 
 def sweep(
-    problem: Problem, points: Sequence[Point], *, workers: int, record: Callable[[Entry], None]
+    problem: Problem,
+    points: Sequence[Point],
+    *,
+    workers: int,
+    record: Callable[[Entry], None],
+    stored: Sequence[Entry] = (),
+    executor: Executor | None = None,
 ) -> SweepResult:
     """Evaluate the points, then some of them again in reverse order: an evaluation depends on its design
     alone, so that a row which differs, if only in its last bit, shows a hidden state.
 
     ``record`` gets each evaluation as it ends, in any order. Whatever happens at a point becomes a row with
     status "failed" and the reason. Ctrl-C ends the sweep as "interrupted" with everything evaluated so far.
+
+    ``stored``: the log of an earlier sweep of these points, which is not evaluated again, but for points that
+    failed: whether they showed a bug is not in it. ``executor``: who evaluates, ``workers`` threads if None.
     """
-    entries: dict[int, Entry] = {}
+    entries = {entry.number: entry for entry in stored}
     faults: dict[int, Exception] = {}
     repeated = 0
     disagreements: list[int] = []
     ending: Literal["finished", "interrupted"] = "finished"
-    try:
-        with closing(_evaluated(problem, points, workers)) as forward:
-            for entry, fault in forward:
-                entries[entry.number] = entry
-                if fault is not None:
-                    faults[entry.number] = fault
-                record(entry)
-        again = [point for point in reversed(points) if point.number % REPEATED_EVERY == 0]
-        with closing(_evaluated(problem, again, workers)) as backward:
-            for entry, _ in backward:
-                repeated += 1
-                if not same_row(entry, entries[entry.number]):
-                    disagreements.append(entry.number)
-    except KeyboardInterrupt:
-        ending = "interrupted"
+    kept = {number for number, entry in entries.items() if entry.evaluation.status != "failed"}
+    left = [point for point in points if point.number not in kept]
+    again = [point for point in reversed(points) if point.number % REPEATED_EVERY == 0]
+    with ExitStack() as stack:
+        if executor is None:
+            executor = stack.enter_context(closing(Threads(workers)))
+        try:
+            with closing(executor.as_they_end(_evaluate, problem, left)) as forward:
+                for _, (entry, fault) in forward:
+                    if fault is not None:
+                        faults[entry.number] = fault
+                    if entry.number not in entries:
+                        entries[entry.number] = entry
+                        record(entry)
+            with closing(executor.as_they_end(_evaluate, problem, again)) as backward:
+                for _, (entry, _) in backward:
+                    repeated += 1
+                    if not same_row(entry, entries[entry.number]):
+                        disagreements.append(entry.number)
+        except KeyboardInterrupt:
+            ending = "interrupted"
     ordered = tuple(entries[number] for number in sorted(entries))
     return SweepResult(ordered, repeated, tuple(sorted(disagreements)), ending, faults)
 
@@ -129,28 +142,8 @@ def _timeless(entry: Entry) -> str:
     return json.dumps(entry_to_json(entry) | {"seconds": 0.0})
 
 
-def _evaluated(
-    problem: Problem, points: Sequence[Point], workers: int
-) -> Generator[tuple[Entry, Exception | None], None, None]:
-    """Each point's entry, as they end; and what went wrong beyond what an evaluation can put in words."""
-    if workers == 1:
-        for point in points:
-            yield _evaluate(problem, point)
-        return
-    pool = ThreadPoolExecutor(max_workers=workers)
-    waiting: set[Future[tuple[Entry, Exception | None]]] = set()
-    try:
-        for point in points:
-            if len(waiting) >= AHEAD * workers:
-                ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                yield from (future.result() for future in ended)
-            waiting.add(pool.submit(_evaluate, problem, point))
-        yield from (future.result() for future in as_completed(waiting))
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
 def _evaluate(problem: Problem, point: Point) -> tuple[Entry, Exception | None]:
+    """A point's entry, and what went wrong beyond what an evaluation can put in words."""
     began = time.perf_counter()
     try:
         return Entry(point.number, evaluate(problem, point.design)), None
@@ -159,4 +152,4 @@ def _evaluate(problem: Problem, point: Point) -> tuple[Entry, Exception | None]:
         reason = words if len(words) <= LONGEST_REASON else f"{words[: LONGEST_REASON - 1]}…"
         seconds = time.perf_counter() - began
         failed = Evaluation(dict(point.design), {}, {}, {}, {}, {}, math.inf, "failed", reason, seconds)
-        return Entry(point.number, failed), error
+        return Entry(point.number, failed), portable(error)

@@ -6,11 +6,13 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tpm_design.errors import UsageError
+from tpm_design.runs.executors import Executor
 from tpm_design.runs.folder import (
     STUDY,
     SUMMARY,
@@ -21,10 +23,12 @@ from tpm_design.runs.folder import (
     read_run,
     text_hash,
 )
+from tpm_design.runs.lock import sole_writer
 from tpm_design.runs.search import Entry, best_entry
-from tpm_design.runs.sweeps import WHOLE, Shard, SweepResult, sweep
+from tpm_design.runs.sweeps import WHOLE, Point, Shard, SweepResult, sweep
 from tpm_design.study.plain import dump_yaml
 from tpm_design.study.resolve import load_study
+from tpm_design.study.resuming import check_resumable
 from tpm_design.study.study import Study
 from tpm_design.study.sweep_points import plan_of_sweep, plan_size, sweep_points
 
@@ -49,22 +53,60 @@ def sweep_study(
     workers: int,
     output: Path | None,
     watch: Callable[[Entry], None] = lambda entry: None,
+    resume: Path | None = None,
+    executor: Executor | None = None,
 ) -> SweepRun:
     """Evaluate the study's plan, or one shard of it; with ``output`` the run is written below it as it
-    happens. ``watch`` sees each evaluation. Raises UsageError before anything runs."""
-    began = time.perf_counter()
+    happens. ``watch`` sees each evaluation. ``resume``: a run folder to go on in instead of a new one.
+    ``executor``: who evaluates, ``workers`` threads if None. Raises UsageError before anything runs,
+    RunStoppedError where the run cannot be written."""
     points = sweep_points(study, shard)
-    writer = None if output is None else _writer(study, output)
+    if resume is not None:
+        check_resumable(study, resume, shard)
+    folder = resume
+    if folder is None and output is not None:
+        folder = create_run_folder(output, study.name, study.study_hash)
+    began = time.perf_counter()
 
-    def record(entry: Entry) -> None:
-        if writer is not None:
-            writer.record(entry)
-        watch(entry)
+    def swept(record: Callable[[Entry], None], stored: Sequence[Entry]) -> SweepResult:
+        for entry in stored:
+            watch(entry)
+        return sweep(study.problem, points, workers=workers, record=record, stored=stored, executor=executor)
 
-    result = sweep(study.problem, points, workers=workers, record=record)
-    return _finished(
-        study, result, shard, writer, workers=workers, seconds=time.perf_counter() - began, merged=()
-    )
+    if folder is None:
+        return _ended(study, swept(watch, ()), shard, None)
+    with sole_writer(folder):
+        stored: tuple[Entry, ...] = ()
+        if resume is not None:
+            # only now can nobody else write to it
+            check_resumable(study, folder, shard)
+            stored = _of_these(points, read_run(folder).entries)
+        with closing(_writer(study, folder, shard, stored)) as writer:
+
+            def record(entry: Entry) -> None:
+                writer.record(entry)
+                watch(entry)
+
+            run = _ended(study, swept(record, stored), shard, folder)
+            told = {} if resume is None else {"resumed_after": len(stored)}
+            _finish(
+                writer,
+                study,
+                run,
+                shard,
+                told,
+                workers=workers if executor is None else executor.workers,
+                seconds=time.perf_counter() - began,
+                merged=(),
+            )
+    return run
+
+
+def _of_these(points: Sequence[Point], entries: Sequence[Entry]) -> tuple[Entry, ...]:
+    """The entries that belong to one of the points, each once."""
+    designs = {point.number: _text(point.design) for point in points}
+    found = {e.number: e for e in entries if designs.get(e.number) == _text(e.evaluation.design)}
+    return tuple(found.values())
 
 
 def merge_runs(folders: Sequence[Path], *, output: Path, allow_code: bool) -> tuple[Study, SweepRun]:
@@ -106,49 +148,57 @@ def merge_runs(folders: Sequence[Path], *, output: Path, allow_code: bool) -> tu
         "finished",
         {},
     )
-    merged = _finished(
-        study,
-        result,
-        WHOLE,
-        _writer(study, output),
-        workers=sum(int(run.summary["workers"]) for run in runs),
-        seconds=sum(float(run.summary["seconds"]) for run in runs),
-        merged=[run.folder.resolve().name for run in runs],
-    )
+    folder = create_run_folder(output, study.name, study.study_hash)
+    with closing(_writer(study, folder, WHOLE, ())) as writer:
+        merged = _ended(study, result, WHOLE, folder)
+        _finish(
+            writer,
+            study,
+            merged,
+            WHOLE,
+            {},
+            workers=sum(int(run.summary["workers"]) for run in runs),
+            seconds=sum(float(run.summary["seconds"]) for run in runs),
+            merged=[run.folder.resolve().name for run in runs],
+        )
     return study, merged
 
 
-def _writer(study: Study, output: Path) -> RunWriter:
-    folder = create_run_folder(output, study.name, study.study_hash)
+def _writer(study: Study, folder: Path, shard: Shard, stored: Sequence[Entry]) -> RunWriter:
     if study.plug_in is not None:
         study.plug_in.write_beside(folder / STUDY)
-    return RunWriter(folder, study.problem, study.units, dump_yaml(study.resolved()))
+    told = {"sweep": {"points": plan_size(plan_of_sweep(study)), "shard": str(shard)}}
+    return RunWriter(folder, study.problem, study.units, dump_yaml(study.resolved()), stored, told)
 
 
-def _finished(
+def _ended(study: Study, result: SweepResult, shard: Shard, folder: Path | None) -> SweepRun:
+    best = best_entry(study.problem, result.entries)
+    status = status_of_sweep(result, shard, plan_size(plan_of_sweep(study)))
+    return SweepRun(result, best, status, folder)
+
+
+def _finish(
+    writer: RunWriter,
     study: Study,
-    result: SweepResult,
+    run: SweepRun,
     shard: Shard,
-    writer: RunWriter | None,
+    told: Mapping[str, Any],
     *,
     workers: int,
     seconds: float,
     merged: Sequence[str],
-) -> SweepRun:
-    best = best_entry(study.problem, result.entries)
-    status = status_of_sweep(result, shard, plan_size(plan_of_sweep(study)))
-    run = SweepRun(result, best, status, None if writer is None else writer.folder)
-    if writer is not None:
-        summary = _summary(study, run, shard) | {
-            "workers": workers,
-            "merged": list(merged),
-            "study_hash": study.study_hash,
-            "study_file_hash": text_hash(dump_yaml(study.resolved())),
-            **provenance(),
-            "seconds": round(seconds, 3),
-        }
-        writer.finish(result.entries, result.entries, summary, ranked=False)
-    return run
+) -> None:
+    """Write what belongs to a run that ended; ``told``: more for run.json."""
+    summary = _summary(study, run, shard) | {
+        "workers": workers,
+        "merged": list(merged),
+        "study_hash": study.study_hash,
+        "study_file_hash": text_hash(dump_yaml(study.resolved())),
+        **provenance(),
+        **told,
+        "seconds": round(seconds, 3),
+    }
+    writer.finish(run.result.entries, run.result.entries, summary, ranked=False)
 
 
 def _summary(study: Study, run: SweepRun, shard: Shard) -> dict[str, Any]:

@@ -45,7 +45,8 @@ units: {{length: mm, angle: deg}}    # of every number in this file; mm, cm, m, 
 mechanism:
   type: {kind.name}    # {kind.title}
   # number: fixed; {{min, max, initial}}: free, initial may be left out; {{values: [1, 2]}}: one of these;
-  # {{equals: f}}: always the value of f
+  # {{equals: f}}: always the value of f; {{ratio: f, min: 0.5, max: 2}}: free as a multiple of f;
+  # scale: log in a range: small values searched as finely as large ones
   parameters:
 {chr(10).join(lines)}{mode}{limits}
   limits: {{}}
