@@ -16,6 +16,7 @@ NAMES = (
     "volume",
     "certified_volume",
     "certificate",
+    "screening",
     "sweep",
     "cluster",
     "study",

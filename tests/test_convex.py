@@ -21,7 +21,7 @@ from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.mechanisms.outer_reach import Affine, ReachCone
 from tpm_design.mechanisms.uru import planes_are_singular
 from tpm_design.optimizers.conic import Cones, ConicProgram, solve
-from tpm_design.problem import Problem
+from tpm_design.problem import Design, Problem
 from tpm_design.study.study import Study
 from tpm_design.synthesis.bodies import body
 from tpm_design.synthesis.bound import ReachBound, reach_bound, relaxed_designs
@@ -90,6 +90,14 @@ def least(problem: Problem) -> float:
 # ------------------------------------------------------------------------------------- closed forms
 
 
+def uru_of_short_base(share: float) -> float:
+    """f + r (m) where one link is of 50 mm and d_b ``share`` of the other: R² = (a + μ + d_p − d_b)² +
+    2 (a + μ)² with d_b = share (R − 50 mm)."""
+    offset = EDGE + DISTANCE + 0.06 + 0.05 * share
+    constant = offset**2 + 2 * (EDGE + DISTANCE) ** 2
+    return float(max(np.roots([1.0 - share**2, 2.0 * offset * share, -constant])))
+
+
 @pytest.mark.parametrize(
     ("pairs", "reach"),
     [
@@ -101,6 +109,12 @@ def least(problem: Problem) -> float:
         ([], 0.326803),
         ([("{min: 0, max: 400}", "{min: 0, max: 100}")], 0.359444),
         ([("{min: 0, max: 400}", "{min: 0, max: 60}")], 0.381051),
+        # d_b up to a multiple of what is fixed; of f, where more would help: (f, r) = (R − 50, 50) mm
+        ([BEYOND_20, ("{min: 0, max: 400}", "{ratio: dp, min: 0.1, max: 1.6666666666666667}")], 0.359444),
+        ([BEYOND_20, ("{min: 0, max: 400}", "{ratio: f, min: 0, max: 2}")], 0.326803),
+        ([BEYOND_20, ("{min: 0, max: 400}", "{ratio: f, min: 0, max: 0.1}")], uru_of_short_base(0.1)),
+        ([BEYOND_20, ("{min: 0, max: 400}", "{ratio: r, min: 0.01, max: 0.3, scale: log}")],
+         uru_of_short_base(0.3)),
         # the octant alone
         ([REACH_ALONE], math.sqrt(EDGE**2 / 4 + 2 * EDGE**2)),
         # no octant: the cube about the middle, d_p = d_b
@@ -117,6 +131,45 @@ def test_the_smallest_uru_for_a_cube(tmp_path: Path, pairs: list[tuple[str, str]
     problem = study_of(tmp_path, URU, *pairs).problem
     assert least(problem) / 3 == pytest.approx(reach, rel=2e-6)
     assert least(problem) / 3 <= reach * (1 + CLOSE)
+
+
+@pytest.mark.parametrize(("longest", "reachable"), [(326.81 / 1.8, True), (326.79 / 1.8, False)])
+def test_links_in_a_ratio_are_only_so_long_together(tmp_path: Path, longest: float, reachable: bool) -> None:
+    links = f"f: {{min: 50, max: {longest}}}, r: {{ratio: f, min: 0.5, max: 0.8}}"
+    problem = study_of(
+        tmp_path, URU, BEYOND_20, ("f: {min: 50, max: 600}, r: {min: 50, max: 600}", links)
+    ).problem
+    bound = reach_bound(problem)
+    assert bound is not None
+    assert bound.reachable is reachable
+    start: Design = {"db": 0.1, "dp": 0.06, "f": 0.1, "r": 0.06, "k": 1.0, "mode": "+++ +++"}
+    for design in relaxed_designs(problem, start, 9):
+        assert 0.5 - CLOSE <= float(design["r"]) / float(design["f"]) <= 0.8 + CLOSE
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_ratio_is_bounded_as_its_best_value_is(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
+    """The least over all d_b = q f is that of the best q and f, each fixed in turn."""
+    rng = np.random.default_rng(seed)
+    low = rng.uniform(0.05, 0.5)
+    high = low + rng.uniform(0.05, 1.0)
+    folder = tmp_path_factory.mktemp("ratio")
+    free = least(
+        study_of(
+            folder, URU, BEYOND_20, ("{min: 0, max: 400}", f"{{ratio: f, min: {low}, max: {high}}}")
+        ).problem
+    )
+    for _ in range(3):
+        length, share = rng.uniform(50.0, 300.0), rng.uniform(low, high)
+        fixed = least(
+            study_of(
+                folder, URU, BEYOND_20,
+                ("db: {min: 0, max: 400}", f"db: {length * share}"),
+                ("f: {min: 50, max: 600}", f"f: {length}"),
+            ).problem
+        )  # fmt: skip
+        assert fixed >= free * (1 - CLOSE)
 
 
 def test_the_smallest_isotropic_crr_for_a_cube() -> None:

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from tpm_design.errors import ParameterError
 from tpm_design.mechanisms.base import Dimension, MechanismKind
 from tpm_design.mechanisms.mechanism import Mechanism
-from tpm_design.metrics.base import UNDEFINED, Measurement, Metric, Sense
+from tpm_design.metrics.base import COSTS, UNDEFINED, Measurement, Metric, Sense
 from tpm_design.metrics.context import Context
 from tpm_design.workspace.region_geometry import PlacedRegion, place
 from tpm_design.workspace.regions import Points, Shape
@@ -28,7 +28,9 @@ class Variable:
     """One free quantity. Continuous: ``lower``..``upper``. Otherwise one of ``values`` (SI or mode labels).
 
     ``mirrored``: the value takes the sign of the mode's octant along that axis, so that a search over
-    octants keeps one range.
+    octants keeps one range. ``scale``: "log" is searched by its logarithm, ``lower`` > 0. ``ratio_of``: the
+    parameter that it is searched as a multiple of; ``lower``, ``upper`` and ``initial`` are multiples then,
+    its value in a design is SI like any other.
     """
 
     name: str
@@ -38,6 +40,8 @@ class Variable:
     values: tuple[float, ...] | tuple[str, ...] = ()
     initial: float | str | None = None
     mirrored: bool = False
+    scale: Literal["linear", "log"] = "linear"
+    ratio_of: str | None = None
 
 
 @dataclass(frozen=True)
@@ -97,10 +101,24 @@ class Problem:
 
 
 @dataclass(frozen=True)
+class Cutoff:
+    """What a design must not be worse than to be worth measuring: a ``violation`` and, where that is 0, a
+    value of the objective as ``scaled_objective`` gives it."""
+
+    violation: float
+    objective: float
+
+
+@dataclass(frozen=True)
 class Evaluation:
     """One evaluated design, SI units. ``slacks``: constraint label → signed distance to its bound, the
     least of its ``pieces``: one number, or a fixed number of them, smoother in the design; those of the
-    problem's samples included."""
+    problem's samples included. Of several objectives ``pieces`` has the values of which each is the least or
+    the greatest, none where it is one by itself.
+
+    "aborted": found to be worse than ``cutoff`` before everything was measured. What was not measured is
+    missing; ``violation`` is what it is at least.
+    """
 
     design: Design
     metrics: Mapping[str, float]
@@ -109,9 +127,10 @@ class Evaluation:
     pieces: Mapping[str, tuple[float, ...]]
     notes: Mapping[str, str]
     violation: float
-    status: Literal["feasible", "infeasible", "failed"]
+    status: Literal["feasible", "infeasible", "failed", "aborted"]
     reason: str
     seconds: float
+    cutoff: Cutoff | None = None
 
 
 def with_ties(ties: Mapping[str, str], design: Design) -> Design:
@@ -119,56 +138,159 @@ def with_ties(ties: Mapping[str, str], design: Design) -> Design:
     return {**design, **{name: design[source] for name, source in ties.items()}}
 
 
-def evaluate(problem: Problem, design: Design) -> Evaluation:
-    """Every objective, constraint and recorded metric of one design.
+def evaluate(problem: Problem, design: Design, cutoff: Cutoff | None = None) -> Evaluation:
+    """Every objective, constraint and recorded metric of one design, the cheap ones first.
 
     A constraint is met only on the unfavourable side of its metric's numeric error, and where the problem's
     samples meet it too. A design that cannot be built or measured gets status "failed" and its reason;
-    nothing is raised.
+    nothing is raised. With a ``cutoff`` the evaluation ends as "aborted" as soon as the design is sure to be
+    worse: measured to the end it would be.
     """
     began = time.perf_counter()
-    goals = (*problem.objectives, *problem.constraints, *problem.record)
+    measured: dict[str, Measurement] = {}
     try:
         context = design_context(problem, design)
-        measurements = {goal.label: _measure(context, goal) for goal in goals}
-        sampled = _sampled(problem, context, measurements)
+        for goal in _by_cost(problem):
+            why = _why_worse(problem, measured, cutoff)
+            if why:
+                return _judged(problem, design, measured, began, cutoff=cutoff, why=why)
+            measured[goal.label] = _measure(context, goal)
+        if problem.samples:
+            why = _why_worse(problem, measured, cutoff)
+            if why:
+                return _judged(problem, design, measured, began, cutoff=cutoff, why=why)
+        sampled = _sampled(problem, context, measured)
     except (ParameterError, ArithmeticError) as error:
         reason = error.what if isinstance(error, ParameterError) else str(error)
         return Evaluation(
             dict(design), {}, {}, {}, {}, {}, math.inf, "failed", reason, time.perf_counter() - began
         )
-    undefined = {label: m.notes[UNDEFINED] for label, m in measurements.items() if UNDEFINED in m.notes}
-    own = {goal.label: slack_pieces(goal, measurements[goal.label]) for goal in problem.constraints}
-    pieces = {label: values + sampled.pieces.get(label, ()) for label, values in own.items()}
-    slacks = {label: min(values) for label, values in pieces.items()}
-    short = {goal.label: max(0.0, -slacks[goal.label]) / goal.metric.scale for goal in problem.constraints}
+    return _judged(problem, design, measured, began, sampled=sampled)
+
+
+def is_worse(problem: Problem, evaluation: Evaluation, cutoff: Cutoff) -> bool:
+    """Whether what was measured of a design is enough to be worse than a cutoff."""
+    value = evaluation.metrics.get(problem.objectives[0].label, math.nan)
+    return bool(_worse(problem, evaluation.violation, value, cutoff))
+
+
+def scaled_objective(goal: Goal, value: float) -> float:
+    """An objective's value (SI) over its scale, turned so that less is better."""
+    return (value if goal.sense == "minimize" else -value) / goal.metric.scale
+
+
+def _by_cost(problem: Problem) -> list[Goal]:
+    """What decides on a design, cheap metrics first, then what is only recorded."""
+    deciding = (*problem.objectives, *problem.constraints)
+    return [*sorted(deciding, key=lambda goal: COSTS.index(goal.metric.cost)), *problem.record]
+
+
+def _why_worse(problem: Problem, measured: Mapping[str, Measurement], cutoff: Cutoff | None) -> str:
+    """Why a design is worse than a cutoff, empty where that is not sure yet."""
+    if cutoff is None:
+        return ""
+    short = _shortfalls(problem, measured, {})
+    first = measured.get(problem.objectives[0].label)
+    value = math.nan if first is None else first.value
+    worse = _worse(problem, sum(short.values()), value, cutoff)
+    if worse == "violation" and cutoff.violation == 0.0:
+        return f"{', '.join(label for label, value in short.items() if value > 0.0)} missed"
+    return problem.objectives[0].label if worse == "objective" else worse
+
+
+def _worse(
+    problem: Problem, violation: float, objective: float, cutoff: Cutoff
+) -> Literal["", "violation", "objective"]:
+    """In what a design with at least this ``violation`` is worse; ``objective`` (SI): NaN if not known."""
+    if violation > cutoff.violation:
+        return "violation"
+    goal = problem.objectives[0]
+    if cutoff.violation == 0.0 and len(problem.objectives) == 1 and math.isfinite(objective):
+        return "objective" if scaled_objective(goal, objective) > cutoff.objective else ""
+    return ""
+
+
+def _slack_pieces(
+    problem: Problem, measured: Mapping[str, Measurement], sampled: Mapping[str, tuple[float, ...]]
+) -> dict[str, tuple[float, ...]]:
+    """Of each constraint that was measured, those of the samples included."""
+    return {
+        goal.label: slack_pieces(goal, measured[goal.label]) + sampled.get(goal.label, ())
+        for goal in problem.constraints
+        if goal.label in measured
+    }
+
+
+def _objective_pieces(problem: Problem, measured: Mapping[str, Measurement]) -> dict[str, tuple[float, ...]]:
+    """Of each of several objectives that was measured: a search for a front bounds objectives too."""
+    if len(problem.objectives) == 1:
+        return {}
+    return {g.label: measured[g.label].pieces for g in problem.objectives if g.label in measured}
+
+
+def _shortfalls(
+    problem: Problem, measured: Mapping[str, Measurement], sampled: Mapping[str, tuple[float, ...]]
+) -> dict[str, float]:
+    """What each goal that was measured adds to the violation."""
+    pieces = _slack_pieces(problem, measured, sampled)
+    scales = {goal.label: goal.metric.scale for goal in problem.constraints}
+    short = {label: max(0.0, -min(values)) / scales[label] for label, values in pieces.items()}
     for goal in problem.objectives:
-        if goal.label in undefined:
+        if goal.label in measured and UNDEFINED in measured[goal.label].notes:
             short[goal.label] = UNDEFINED_VIOLATION
-    violation = sum(short.values())
+    return short
+
+
+def _judged(
+    problem: Problem,
+    design: Design,
+    measured: Mapping[str, Measurement],
+    began: float,
+    *,
+    sampled: _Sampled | None = None,
+    cutoff: Cutoff | None = None,
+    why: str = "",
+) -> Evaluation:
+    """The evaluation of what was measured: everything, or enough to be worse than a cutoff."""
+    sampled = sampled or _Sampled({}, {})
+    goals = (*problem.objectives, *problem.constraints, *problem.record)
+    found = {goal.label: measured[goal.label] for goal in goals if goal.label in measured}
+    pieces = _slack_pieces(problem, measured, sampled.pieces)
+    short = _shortfalls(problem, measured, sampled.pieces)
     missed = [label for label, value in short.items() if value > 0.0]
+    status: Literal["feasible", "infeasible", "aborted"] = "infeasible" if missed else "feasible"
+    if cutoff is not None:
+        status = "aborted"
+        left = ", ".join(goal.label for goal in goals if goal.label not in measured) or "samples"
+        reason = f"not measured further: {left}; already worse than the best known ({why})"
+    else:
+        reason = "; ".join(_why_missed(label, problem, measured, sampled) for label in missed)
     return Evaluation(
         design=dict(design),
-        metrics={label: m.value for label, m in measurements.items()},
-        errors={label: m.error for label, m in measurements.items()},
-        slacks=slacks,
-        pieces=pieces,
+        metrics={label: m.value for label, m in found.items()},
+        errors={label: m.error for label, m in found.items()},
+        slacks={label: min(values) for label, values in pieces.items()},
+        pieces={**pieces, **_objective_pieces(problem, measured)},
         notes={
             f"{label}_{key}": note
-            for label, m in measurements.items()
+            for label, m in found.items()
             for key, note in m.notes.items()
             if key != UNDEFINED
         },
-        violation=violation,
-        status="infeasible" if missed else "feasible",
-        reason="; ".join(
-            f"{label}: {undefined[label]}"
-            if label in undefined
-            else f"{label} missed{sampled.why(label) if min(own[label]) >= 0.0 else ''}"
-            for label in missed
-        ),
+        violation=sum(short.values()),
+        status=status,
+        reason=reason,
         seconds=time.perf_counter() - began,
+        cutoff=cutoff,
     )
+
+
+def _why_missed(label: str, problem: Problem, measured: Mapping[str, Measurement], sampled: _Sampled) -> str:
+    if UNDEFINED in measured[label].notes:
+        return f"{label}: {measured[label].notes[UNDEFINED]}"
+    goal = next(goal for goal in problem.constraints if goal.label == label)
+    by_itself = min(slack_pieces(goal, measured[label])) >= 0.0
+    return f"{label} missed{sampled.why(label) if by_itself else ''}"
 
 
 def design_context(problem: Problem, design: Design) -> Context:

@@ -13,6 +13,11 @@ if TYPE_CHECKING:
 Sense = Literal["maximize", "minimize"]
 UNDEFINED = "undefined"
 
+Cost = Literal["closed form", "extreme", "locus", "rays"]
+COSTS: tuple[Cost, ...] = ("closed form", "extreme", "locus", "rays")
+"""What a metric takes, cheapest first: a formula; least values over the region; distances to loci, which are
+dearer than rays where the whole region is reachable, and nothing where it is not; volumes by rays."""
+
 
 @dataclass(frozen=True)
 class Option:
@@ -72,7 +77,7 @@ class Metric:
     """One figure of merit. ``scale`` (in the metric's SI unit) makes its violation dimensionless. ``notes``:
     names of the notes its measurements may carry. ``refusal(kind, limits)``: why it means nothing for a
     mechanism with these limits, None where it does; ``drives``: those of the mechanism's drives for which it
-    does, the usual one first."""
+    does, the usual one first. ``cost``: what it takes; cheap ones are measured first."""
 
     name: str
     unit: str
@@ -87,6 +92,7 @@ class Metric:
     notes: tuple[str, ...] = ()
     refusal: Callable[[MechanismKind, Mapping[str, Any]], str | None] = never_refused
     drives: Callable[[MechanismKind], tuple[str, ...]] = lambda kind: kind.drives
+    cost: Cost = "extreme"
 
     def option(self, name: str) -> Option | None:
         return next((option for option in self.options if option.name == name), None)

@@ -55,6 +55,7 @@ def _distance(name: str, condition: str) -> Metric:
         f"{name}_singularity_distance", "m", "maximize", 0.1,
         f"least Euclidean distance from the region to {condition}; minus the depth where it cuts in",
         SEARCH, _locus_distance(name), differentiable=False, notes=("locus",), refusal=of_positions,
+        cost="locus",
     )  # fmt: skip
 
 

@@ -32,5 +32,6 @@ METRICS = (
         "largest tilt for which the platform, upright or tilted by less in any direction, stays within reach "
         "and joint limits and on one side of all singularities", "search along rays, bisected",
         _all_round_tilt, (DISTANCE,), needs_region=False, notes=("limit",), refusal=_upright,
+        cost="locus",
     ),
 )  # fmt: skip

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpm_design.optimizers.base import FloatArray, Outcomes, Search, Stalled
+from tpm_design.errors import RefusedError
+from tpm_design.optimizers.base import FloatArray, FrontSearch, Outcomes, ScreeningSearch, Search, Stalled
 
 LOCAL_STEP = 0.05
 """First step of local methods, as a share of each variable's range: chosen on constrained problems in seven
@@ -61,6 +62,16 @@ class Watch:
 
         Raises whatever ended the search first, again at every later call.
         """
+        return self._asked(points, self.search.evaluate)
+
+    def screen(self, points: FloatArray, keep: int) -> Outcomes:
+        """As ``evaluate``, the ``keep`` best of them to the end; all where the search cannot screen."""
+        search = self.search
+        if not isinstance(search, ScreeningSearch):
+            return self.evaluate(points)
+        return self._asked(points, lambda inside: search.screen(inside, keep))
+
+    def _asked(self, points: FloatArray, ask: Callable[[FloatArray], Outcomes]) -> Outcomes:
         if self.stopped is not None:
             raise self.stopped
         try:
@@ -69,7 +80,7 @@ class Watch:
             if np.isnan(inside).any():
                 raise Stalled("The method broke down: it asked for a point that is not a number.")
             self._note(inside)
-            return self.search.evaluate(inside)
+            return ask(inside)
         except BaseException as reason:
             self.stopped = reason
             raise
@@ -110,6 +121,12 @@ class Watch:
             jacobian=((constraints[1 : 1 + size] - constraints[1 + size :]) / width[:, None]).T,
         )
 
+    def see_pieces(self) -> None:
+        """From here on constraints and objectives in as many pieces as a known point has of each."""
+        if isinstance(self.search, FrontSearch):
+            self.search = self.search.in_pieces()
+            self.constraint_count = self.search.constraint_count
+
     def _note(self, points: FloatArray) -> None:
         """Counts points in a row that were all known before; a level counts as one value."""
         levels = np.maximum(self.levels, 1)
@@ -123,6 +140,13 @@ class Watch:
                 self._repeats = 0
         if self._repeats > REPEATS_ALLOWED:
             raise Stalled("Nothing left to try: every further point had been evaluated before.")
+
+
+def objective_count(watch: Watch) -> int:
+    """How many objectives a search has. Raises RefusedError where it tells only one."""
+    if not isinstance(watch.search, FrontSearch):
+        raise RefusedError("This search has one objective.", remedy="Choose a method for one objective.")
+    return watch.search.objective_count
 
 
 def watched(method: Callable[[Watch, int], str]) -> Callable[[Search, int], str]:

@@ -35,10 +35,12 @@ class History:
 
 
 def history(problem: Problem, entries: tuple[Entry, ...]) -> History:
-    """The course of the first objective."""
+    """The course of the first objective; of aborted evaluations nothing is told."""
     goal = problem.objectives[0]
     objective = np.array([e.evaluation.metrics.get(goal.label, math.nan) for e in entries], dtype=np.float64)
     violation = np.array([e.evaluation.violation for e in entries], dtype=np.float64)
+    aborted = np.array([e.evaluation.status == "aborted" for e in entries], dtype=np.bool_)
+    objective[aborted] = violation[aborted] = np.nan
     feasible = np.array([e.evaluation.status == "feasible" for e in entries], dtype=np.bool_)
     better = np.fmin if goal.sense == "minimize" else np.fmax
     violation[~np.isfinite(violation)] = np.nan

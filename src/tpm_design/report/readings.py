@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from tpm_design.design_space import coordinate_of
 from tpm_design.problem import Evaluation, Goal, Problem, Variable
 from tpm_design.runs.optimize import binding
 from tpm_design.runs.search import Entry
@@ -75,11 +76,6 @@ def nearest_constraint(problem: Problem, entry: Entry) -> Reading | None:
 
 def at_end(problem: Problem, evaluation: Evaluation) -> tuple[Variable, ...]:
     """The continuous quantities at an end of their range."""
-    return tuple(v for v in problem.variables if not v.values and _is_at_end(v, evaluation))
-
-
-def _is_at_end(variable: Variable, evaluation: Evaluation) -> bool:
-    value = float(evaluation.design[variable.name])
-    value = abs(value) if variable.mirrored else value
-    room = min(value - variable.lower, variable.upper - value)
-    return room <= AT_END * (variable.upper - variable.lower)
+    continuous = [variable for variable in problem.variables if not variable.values]
+    shares = [coordinate_of(variable, evaluation.design) for variable in continuous]
+    return tuple(v for v, share in zip(continuous, shares, strict=True) if min(share, 1.0 - share) <= AT_END)

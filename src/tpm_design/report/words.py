@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from tpm_design.mechanisms.base import MechanismKind
-from tpm_design.problem import Goal, Problem
+from tpm_design.problem import Goal, Problem, Variable
 from tpm_design.runs.tables import parameter_unit
 from tpm_design.units import Units, si_unit
 from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere, Tilt
@@ -120,6 +120,8 @@ def range_text(problem: Problem, name: str, units: Units) -> str:
     variable = next((variable for variable in problem.variables if variable.name == name), None)
     if variable is None:
         return "fixed"
+    if variable.ratio_of is not None:
+        return f"{variable.lower:.6g} … {variable.upper:.6g} × {variable.ratio_of}{_scale_text(variable)}"
     unit = si_unit(variable.dimension)
     name = "" if unit == "-" else f" {units.name(unit)}"
     if len(variable.values) > MOST_LISTED:
@@ -132,7 +134,11 @@ def range_text(problem: Problem, name: str, units: Units) -> str:
         return f"one of {listed}{name}"
     low, high = units.from_si(variable.lower, unit), units.from_si(variable.upper, unit)
     side = ", on the octant's side" if variable.mirrored else ""
-    return f"{low:.6g} … {high:.6g}{name}{side}"
+    return f"{low:.6g} … {high:.6g}{name}{side}{_scale_text(variable)}"
+
+
+def _scale_text(variable: Variable) -> str:
+    return ", log scale" if variable.scale == "log" else ""
 
 
 def tolerances_text(kind: MechanismKind, tolerance: Mapping[str, float], units: Units) -> str:

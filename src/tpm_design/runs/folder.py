@@ -8,7 +8,7 @@ import math
 import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any
 
 from tpm_design.errors import UsageError
-from tpm_design.problem import Evaluation, Problem
+from tpm_design.problem import Cutoff, Evaluation, Problem
 from tpm_design.runs.durable import AppendedLines, replace_file
 from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import EvaluationTable, csv_line, designs_table
@@ -32,7 +32,7 @@ STUDY, TABLE, LOG, DESIGNS, SUMMARY = (
 UNFINISHED = "unfinished"
 """``ending`` in run.json from the start of a run until it is over."""
 
-LIBRARIES = ("tpm-design", "numpy", "scipy", "numba", "nlopt", "pandas")
+LIBRARIES = ("tpm-design", "numpy", "scipy", "numba", "nlopt", "pymoo", "pandas")
 
 
 def create_run_folder(results: Path, study_name: str, study_hash: str) -> Path:
@@ -130,6 +130,9 @@ def entry_to_json(entry: Entry) -> dict[str, Any]:
     data["violation"] = data["violation"] if math.isfinite(data["violation"]) else None
     data["metrics"] = {k: v if math.isfinite(v) else None for k, v in data["metrics"].items()}
     data["errors"] = {k: v if math.isfinite(v) else None for k, v in data["errors"].items()}
+    cutoff = data.pop("cutoff")
+    if cutoff is not None:
+        data["cutoff"] = asdict(cutoff)
     judged_by = {"judged_by": entry.judged_by} if entry.judged_by else {}
     return {"id": entry.number, "round": entry.round, **judged_by, **data}
 
@@ -140,6 +143,7 @@ def entry_from_json(data: Mapping[str, Any]) -> Entry:
     fields["violation"] = math.inf if fields["violation"] is None else fields["violation"]
     for key in ("metrics", "errors"):
         fields[key] = {k: math.nan if v is None else v for k, v in fields[key].items()}
+    fields["cutoff"] = None if fields.get("cutoff") is None else Cutoff(**fields["cutoff"])
     fields["pieces"] = {label: tuple(values) for label, values in fields["pieces"].items()}
     round_number, judged_by = int(data.get("round", 1)), str(data.get("judged_by", ""))
     return Entry(int(data["id"]), Evaluation(**fields), round_number, judged_by)

@@ -13,8 +13,9 @@ from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.optimizers import optimizer
 from tpm_design.optimizers.base import BudgetSpent
-from tpm_design.problem import Goal, Problem, Sample
+from tpm_design.problem import Design, Goal, Problem, Sample
 from tpm_design.runs.executors import Executor
+from tpm_design.runs.optima import distinct_optima
 from tpm_design.runs.optimize import (
     Round,
     SearchPlan,
@@ -25,6 +26,7 @@ from tpm_design.runs.optimize import (
     remarks_on,
     run_method,
     search_all,
+    space_of,
     status_sentence,
     view_of,
 )
@@ -100,6 +102,7 @@ def search_certified(
         remarks_on(plan, problem),
         tuple(course.rounds),
         found,
+        optima=distinct_optima(problem, space_of(problem), best, entries, course.optima),
     )
 
 
@@ -123,6 +126,7 @@ class _Course:
         self.entries: list[Entry] = []
         self.rounds: list[Round] = []
         self.verdicts: dict[int, Verdict] = {}
+        self.optima: list[Design] = []
 
     def run(self) -> tuple[str, str]:
         """All rounds: the ending and a sentence on it."""
@@ -187,6 +191,7 @@ class _Course:
         finally:
             log.close()
             self.entries += log.entries
+            self.optima += log.optima
 
     def _start_again(self, log: EvaluationLog, limit: int) -> None:
         """Judge the best entries of the round before by all samples."""
@@ -204,7 +209,7 @@ class _Course:
 
 def starting_entries(problem: Problem, entries: Sequence[Entry], most: int) -> list[Entry]:
     """The best entry of each choice of the discrete variables, best first, then the next best of all."""
-    space = view_of(EvaluationLog(problem, workers=1), 1).space
+    space = space_of(problem)
     ordered = sorted(entries, key=lambda entry: rank(problem, entry))
     firsts = {discrete_choice(space, entry): entry for entry in reversed(ordered)}
     chosen = [entry for entry in ordered if firsts[discrete_choice(space, entry)] is entry]
@@ -276,13 +281,21 @@ def _corner(
 
 
 def _told(rounds: Sequence[Round], found: Verdict | None, proving: Proving) -> list[str]:
-    """Sentences on what was proved, with a remedy where not all was."""
+    """Sentences on what was proved, and in which round, with a remedy where not all was."""
     if found is None:
         return ["Nothing was certified."]
     certified = next(r for r in reversed(rounds) if r.best is not None and r.outcome == found.outcome)
+    lines = told_of(found, proving, where=f" in round {certified.number}")
+    if found.outcome != "proved" and rounds[-1].outcome == "infeasible":
+        lines.insert(1, f"Round {rounds[-1].number} found no feasible design that holds there as well.")
+    return lines
+
+
+def told_of(found: Verdict, proving: Proving, *, where: str = "") -> list[str]:
+    """Sentences on a verdict, a remedy last where not all was proved. ``where``: in which round it was."""
     within = "within the tolerances" if any(proving.tolerance.values()) else "of exactly these dimensions"
     if found.outcome == "proved":
-        return [f"Proved in round {certified.number} for every machine {within}."]
+        return [f"Proved{where} for every machine {within}."]
     failed = [r for r in found.requirements if r.outcome == found.outcome]
     labels = ", ".join(requirement.goal.label for requirement in failed)
     lines = []
@@ -292,8 +305,6 @@ def _told(rounds: Sequence[Round], found: Verdict | None, proving: Proving) -> l
     else:
         reasons = "; ".join(f"{r.goal.label} ({r.reason})" for r in failed)
         lines.append(f"Not proved for every machine {within}: {reasons}.")
-    if rounds[-1].outcome == "infeasible":
-        lines.append(f"Round {rounds[-1].number} found no feasible design that holds there as well.")
     if not any(r.settlements for r in failed):
         return [*lines, f"Nothing here proves {labels}: record it instead of asking for it."]
     remedies = [f"raise the budget, ask for less of {labels}"]

@@ -14,17 +14,19 @@ from tpm_design.certificates.document import FILE as CERTIFICATE
 from tpm_design.certificates.document import document, write_document
 from tpm_design.certificates.verdict import Verdict
 from tpm_design.errors import UsageError, did_you_mean
-from tpm_design.problem import Design, Evaluation, evaluate, with_ties
+from tpm_design.problem import Design, Evaluation, evaluate
 from tpm_design.runs.executors import Executor
 from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run, text_hash
 from tpm_design.runs.lock import sole_writer
+from tpm_design.runs.marks import front_marks
 from tpm_design.runs.optimality import gap_of, with_bound
 from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, search
+from tpm_design.runs.proved_knee import with_proved_knee
 from tpm_design.runs.replay import answers_in
 from tpm_design.runs.rounds import Proving, search_certified
-from tpm_design.runs.search import Entry, design_key
+from tpm_design.runs.search import Entry, answer_key
 from tpm_design.runs.tables import EvaluationTable, csv_line
-from tpm_design.study.design import choose_design, tied_error
+from tpm_design.study.design import completed_design, tied_error
 from tpm_design.study.plain import dump_yaml
 from tpm_design.study.resuming import check_resumable
 
@@ -36,7 +38,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Run:
-    """A finished search. ``best``: the best feasible evaluation, else the one of least violation.
+    """A finished search. ``best``: the best feasible evaluation, of several objectives the knee of the front,
+    else the one of least violation. ``front``: of several objectives, best first by the first one.
     ``evaluations``: the table of evaluations.csv, in the study's units. ``folder``: None if not written.
     ``verdict``: on the best design, None where the study asks for none or nothing feasible was found."""
 
@@ -46,6 +49,7 @@ class Run:
     result: SearchResult
     folder: Path | None
     verdict: Verdict | None = None
+    front: tuple[Evaluation, ...] = ()
 
 
 def evaluate_design(study: Study, values: Mapping[str, float | str]) -> Evaluation:
@@ -53,13 +57,13 @@ def evaluate_design(study: Study, values: Mapping[str, float | str]) -> Evaluati
 
     Raises UsageError on a name the study does not have.
     """
-    design, _ = choose_design(study, {})
+    known = completed_design(study.problem, {})
     for name in values:
-        if name not in design:
-            raise UsageError(f"This study has no quantity {name!r}.", remedy=did_you_mean(name, design))
+        if name not in known:
+            raise UsageError(f"This study has no quantity {name!r}.", remedy=did_you_mean(name, known))
         if name in study.problem.ties:
             raise tied_error(study.problem.ties, name)
-    return evaluate(study.problem, with_ties(study.problem.ties, {**design, **values}))
+    return evaluate(study.problem, completed_design(study.problem, values))
 
 
 def plan_of(study: Study) -> SearchPlan:
@@ -102,7 +106,8 @@ def optimize_study(
             result = _written(study, plan, workers, executor, watch, folder, stored)
     best = None if result.best is None else result.best.evaluation
     table = evaluations_frame(study, result.entries)
-    return Run(best, table, result.status, result, folder, result.verdict)
+    front = tuple(entry.evaluation for entry in result.front)
+    return Run(best, table, result.status, result, folder, result.verdict, front)
 
 
 def _searched(
@@ -116,8 +121,12 @@ def _searched(
     problem = study.problem
     if study.certification is None:
         result = search(problem, plan, workers=workers, record=record, stored=stored, executor=executor)
+        return with_bound(problem, plan, result)
+    proving = Proving(study.certification.tolerance, study.certification.boxes)
+    if len(problem.objectives) > 1:
+        result = search(problem, plan, workers=workers, record=record, stored=stored, executor=executor)
+        result = with_proved_knee(problem, proving, result, workers=workers)
     else:
-        proving = Proving(study.certification.tolerance, study.certification.boxes)
         result = search_certified(
             problem, plan, proving, workers=workers, record=record, stored=stored, executor=executor
         )
@@ -142,7 +151,7 @@ def _written(
         known = frozenset(answers_in(stored or ()))
 
         def record(entry: Entry) -> None:
-            if (entry.judged_by, design_key(entry.evaluation.design)) not in known:
+            if answer_key(entry) not in known:
                 writer.record(entry)
             watch(entry)
 
@@ -154,6 +163,7 @@ def _written(
             "status": result.status,
             "ending": result.ending,
             "best_id": None if result.best is None else result.best.number,
+            "optima_ids": [entry.number for entry in result.optima],
             "feasible": result.best is not None and result.best.evaluation.status == "feasible",
             "evaluations": len(result.entries),
             "method": plan.method,
@@ -162,6 +172,7 @@ def _written(
             "budget": plan.budget,
             "workers": workers if executor is None else executor.workers,
             "remarks": list(result.remarks),
+            **_front_data(study, result),
             **_bound_data(result),
             **({} if study.certification is None else _rounds_data(result)),
             "study_hash": study.study_hash,
@@ -170,8 +181,16 @@ def _written(
             **({} if stored is None else {"resumed_after": len(stored)}),
             "seconds": round(time.perf_counter() - began, 3),
         }
-        writer.finish(result.entries, [result.best] if result.best else [], summary)
+        writer.finish(result.entries, result.front or result.optima, summary)
     return result
+
+
+def _front_data(study: Study, result: SearchResult) -> dict[str, Any]:
+    """For run.json: ids of the front's designs, and what each is marked with, if anything."""
+    if len(study.problem.objectives) == 1:
+        return {}
+    marks = front_marks(study.problem, result.front)
+    return {"front": {str(e.number): mark for e, mark in zip(result.front, marks, strict=True)}}
 
 
 def _bound_data(result: SearchResult) -> dict[str, Any]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from tpm_design.design_space import first_value, with_ratios
 from tpm_design.errors import UsageError, did_you_mean
-from tpm_design.problem import Design, Variable, with_ties
+from tpm_design.problem import Design, Problem, Variable, with_ties
 from tpm_design.study.document import number
 from tpm_design.study.study import Study
 from tpm_design.study.sweep import design_names, design_value
@@ -27,21 +28,25 @@ def choose_design(study: Study, settings: Mapping[str, str]) -> tuple[Design, tu
             if name in problem.ties:
                 raise tied_error(problem.ties, name)
             raise UsageError(f"this study has no quantity {name!r}", remedy=_remedy(name, names))
-    variables = {variable.name: variable for variable in problem.variables}
-    design: dict[str, float | str] = {}
-    assumptions: list[str] = []
-    for name in names:
-        if name in settings:
-            design[name] = _set_value(study, name, settings[name].strip())
-        elif name in variables:
-            value, reason = _assumed(variables[name])
-            design[name] = value
-            unit = si_unit(variables[name].dimension)
-            text = value if isinstance(value, str) else study.units.written(value, unit)
-            assumptions.append(f"{name} = {text} ({reason})")
-        else:
-            design[name] = problem.fixed[name]
-    return with_ties(problem.ties, design), tuple(assumptions)
+    given = {name: _set_value(study, name, text.strip()) for name, text in settings.items()}
+    left = [variable for variable in problem.variables if variable.name not in given]
+    assumptions = {variable.name: _assumption(study, variable) for variable in left}
+    told = tuple(assumptions[name] for name in names if name in assumptions)
+    return completed_design(problem, given), told
+
+
+def completed_design(problem: Problem, given: Design) -> Design:
+    """The design (SI) with what is ``given``; the rest as ``choose_design`` assumes it."""
+    left = [variable for variable in problem.variables if variable.name not in given]
+    values = {variable.name: first_value(variable) for variable in left if variable.ratio_of is None}
+    known = {**problem.fixed, **values, **given}
+    multiples = {v.name: multiple for v in left if (multiple := first_multiple(v)) is not None}
+    return with_ties(problem.ties, with_ratios(problem.variables, multiples, known))
+
+
+def first_multiple(variable: Variable) -> float | None:
+    """As ``first_value`` for ratios, None for other variables."""
+    return None if variable.ratio_of is None else float(first_value(variable))
 
 
 def tied_error(ties: Mapping[str, str], name: str) -> UsageError:
@@ -68,12 +73,19 @@ def _set_value(study: Study, name: str, text: str) -> float | str:
         raise UsageError(f"{name} {error}", where="--set", remedy="Choose another value.") from None
 
 
-def _assumed(variable: Variable) -> tuple[float | str, str]:
+def _assumption(study: Study, variable: Variable) -> str:
+    value = first_value(variable)
+    if isinstance(value, str):
+        text = value
+    elif variable.ratio_of is not None:
+        text = f"{value:.6g} × {variable.ratio_of}"
+    else:
+        text = study.units.written(value, si_unit(variable.dimension))
     if variable.initial is not None:
-        return variable.initial, "its initial value"
-    if variable.values:
-        return variable.values[0], "the first one listed"
-    return 0.5 * (variable.lower + variable.upper), "the middle of its range"
+        reason = "its initial value"
+    else:
+        reason = "the first one listed" if variable.values else "the middle of its range"
+    return f"{variable.name} = {text} ({reason})"
 
 
 def _remedy(name: str, names: list[str]) -> str:

@@ -80,24 +80,48 @@ class UnitsModel(Strict):
 
 
 class Range(Strict):
-    """``{min, max[, initial]}``: a free quantity."""
+    """``{min, max[, initial][, scale: log]}``: a free quantity."""
 
     min: Number
     max: Number
     initial: Number | None = None
+    scale: Literal["log"] | None = None
 
     @model_validator(mode="after")
     def _in_order(self) -> Range:
-        if self.min > self.max:
-            raise fault(f"min {self.min:g} is larger than max {self.max:g}", "Swap them.")
-        if self.min == self.max:
-            raise fault(f"min and max are both {self.min:g}", "Write the number alone to fix the quantity.")
-        if self.initial is not None and not self.min <= self.initial <= self.max:
-            raise fault(
-                f"initial {self.initial:g} is outside {self.min:g} … {self.max:g}",
-                "Choose it within the range.",
-            )
+        _check_range(self, "Write the number alone to fix the quantity.")
         return self
+
+
+class Ratio(Strict):
+    """``{ratio: f, min, max[, initial][, scale: log]}``: a parameter that is searched as a multiple of
+    another one; the numbers are multiples."""
+
+    ratio: Text
+    min: Number
+    max: Number
+    initial: Number | None = None
+    scale: Literal["log"] | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Ratio:
+        _check_range(self, "Widen the range.")
+        return self
+
+
+def _check_range(given: Range | Ratio, instead: str) -> None:
+    """``instead``: what to do where the range is one value."""
+    if given.min > given.max:
+        raise fault(f"min {given.min:g} is larger than max {given.max:g}", "Swap them.")
+    if given.min == given.max:
+        raise fault(f"min and max are both {given.min:g}", instead)
+    if given.scale == "log" and given.min <= 0.0:
+        raise fault(f"min {given.min:g} has no logarithm", "Choose min above 0, or leave `scale: log` out.")
+    if given.initial is not None and not given.min <= given.initial <= given.max:
+        raise fault(
+            f"initial {given.initial:g} is outside {given.min:g} … {given.max:g}",
+            "Choose it within the range.",
+        )
 
 
 def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -121,13 +145,13 @@ class Equals(Strict):
 def _quantity_form(value: Any) -> str | None:
     if isinstance(value, dict | BaseModel):
         given = value if isinstance(value, dict) else value.model_fields_set
-        return next((form for form in ("values", "equals") if form in given), "range")
+        return next((form for form in ("values", "equals", "ratio") if form in given), "range")
     return "number"
 
 
 def _free_form(value: Any) -> str | None:
     form = _quantity_form(value)
-    return "range" if form == "equals" else form
+    return "range" if form in ("equals", "ratio") else form
 
 
 Quantity = Annotated[
@@ -138,7 +162,8 @@ ParameterQuantity = Annotated[
     Annotated[Number, Tag("number")]
     | Annotated[Range, Tag("range")]
     | Annotated[Values, Tag("values")]
-    | Annotated[Equals, Tag("equals")],
+    | Annotated[Equals, Tag("equals")]
+    | Annotated[Ratio, Tag("ratio")],
     Discriminator(_quantity_form),
 ]
 
@@ -339,7 +364,7 @@ class RecordModel(Entry):
 class OptimizerModel(Strict):
     """``optimizer:``"""
 
-    method: Text = "scipy.differential_evolution"
+    method: Text | None = None
     budget: Annotated[Whole, Field(ge=1, le=10**9)] = 2000
     seed: Annotated[Whole, Field(ge=0, le=2**32 - 1)] = 1
     polish: Text | None = None

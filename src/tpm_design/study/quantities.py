@@ -34,16 +34,6 @@ def domain_words(domain: Domain) -> str:
     return _WORDS[domain]
 
 
-def interval(quantity: float | Variable) -> tuple[float, float]:
-    """Lowest and highest value, SI."""
-    if not isinstance(quantity, Variable):
-        return quantity, quantity
-    if quantity.values:
-        numbers = [float(value) for value in quantity.values]
-        return min(numbers), max(numbers)
-    return quantity.lower, quantity.upper
-
-
 def read_quantity(
     name: str,
     given: float | Range | Values,
@@ -66,6 +56,7 @@ def read_quantity(
             upper=units.to_si(given.max, unit),
             initial=None if given.initial is None else units.to_si(given.initial, unit),
             mirrored=mirrored,
+            scale=given.scale or "linear",
         )
     elif isinstance(given, Values):
         spans = [(value, value) for value in given.values]

@@ -6,8 +6,10 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
+from tpm_design.design_space import spans
 from tpm_design.errors import did_you_mean
 from tpm_design.mechanisms.base import MechanismKind
+from tpm_design.optimizers import default_method
 from tpm_design.optimizers.base import Optimizer
 from tpm_design.problem import Accuracy, Problem, Variable
 from tpm_design.study.document import Document, read_document
@@ -27,16 +29,15 @@ from tpm_design.study.model import (
 )
 from tpm_design.study.plain import plain
 from tpm_design.study.plug_in import PlugIn, read_plug_in
-from tpm_design.study.quantities import interval
 from tpm_design.study.region import check_form, read_region
 from tpm_design.study.registries import Registries, registries
+from tpm_design.study.relations import check_ratios, read_ties
 from tpm_design.study.space import (
     free_center,
     read_center,
     read_limits,
     read_mode,
     read_parameters,
-    read_ties,
 )
 from tpm_design.study.study import Certification, OptimizerSettings, Study
 from tpm_design.study.sweep import SweepReader
@@ -69,13 +70,14 @@ def resolve(document: Document, model: StudyModel, known: Registries, *, allow_c
         check_form(region.type, kind, faults)
     center = region.center if region else None
     parameters = read_parameters(model.mechanism, kind, units, faults)
+    check_ratios(model.mechanism, kind, parameters, faults)
     ties = read_ties(model.mechanism, kind, parameters, faults)
     limits = read_limits(model.mechanism.limits, kind, units, faults)
     certification = _certification(model.certify, kind, units, faults)
-    optimizer = _optimizer(model.optimizer, known.optimizers, faults)
+    optimizer = _optimizer(model.optimizer, len(model.objectives), known.optimizers, faults)
     faults.raise_if_any()  # the modes and the centre's bounds follow from the parameters
 
-    ranges = {name: interval(quantity) for name, quantity in parameters.items()}
+    ranges = spans(parameters)
     ranges |= {name: ranges[source] for name, source in ties.items()}
     modes = read_mode(model.mechanism.mode, kind, ranges, _isotropic(model), faults)
     quantities = dict(parameters)
@@ -135,7 +137,7 @@ def resolve(document: Document, model: StudyModel, known: Registries, *, allow_c
         "region": written_region,
         "objectives": [written for _, written in objectives],
         "constraints": [written for _, written in constraints],
-        "optimizer": model.optimizer,
+        "optimizer": model.optimizer.model_copy(update={"method": optimizer.method}),
         "accuracy": model.accuracy,
         "certify": model.certify,
         "sweep": written_sweep,
@@ -227,13 +229,14 @@ def _tolerance(model: CertifyModel, kind: MechanismKind, units: Units, faults: F
     return found
 
 
-def _optimizer(model: OptimizerModel, methods: Mapping[str, Optimizer], faults: Faults) -> OptimizerSettings:
-    """The method and the local method that polishes its result."""
-    if model.method not in methods:
+def _optimizer(
+    model: OptimizerModel, objectives: int, methods: Mapping[str, Optimizer], faults: Faults
+) -> OptimizerSettings:
+    """The method, by default one for so many objectives, and the local method that polishes its result."""
+    chosen = default_method(objectives) if model.method is None else model.method
+    if chosen not in methods:
         faults.add(
-            ("optimizer", "method"),
-            f"there is no method {shown(model.method)}",
-            did_you_mean(model.method, methods),
+            ("optimizer", "method"), f"there is no method {shown(chosen)}", did_you_mean(chosen, methods)
         )
     local = [name for name, method in methods.items() if not method.abilities.whole_space]
     if model.polish is not None and model.polish not in local:
@@ -241,4 +244,4 @@ def _optimizer(model: OptimizerModel, methods: Mapping[str, Optimizer], faults: 
         faults.add(
             ("optimizer", "polish"), f"{shown(model.polish)} {what}", did_you_mean(model.polish, local)
         )
-    return OptimizerSettings(model.method, model.budget, model.seed, model.polish)
+    return OptimizerSettings(chosen, model.budget, model.seed, model.polish)

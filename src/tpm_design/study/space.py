@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tpm_design.errors import did_you_mean
-from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter, within
+from tpm_design.mechanisms.base import MechanismKind, ModeField, Parameter
 from tpm_design.problem import Variable
 from tpm_design.study.document import Place
 from tpm_design.study.faults import Faults, shown
@@ -21,8 +21,9 @@ from tpm_design.study.model import (
     MechanismModel,
     Quantity,
     Range,
+    Ratio,
 )
-from tpm_design.study.quantities import domain_words, interval, meaning, read_quantity
+from tpm_design.study.quantities import meaning, read_quantity
 from tpm_design.units import Units, si_unit
 
 Modes = dict[str, dict[str, str]]
@@ -45,64 +46,21 @@ def read_parameters(
     found: dict[str, float | Variable] = {}
     for name in kind.parameter_names():
         given = model.parameters.get(name)
-        if given is not None and not isinstance(given, Equals):
+        if isinstance(given, Ratio):
+            found[name] = Variable(
+                name,
+                meaning(name, kind)[0],
+                lower=given.min,
+                upper=given.max,
+                initial=given.initial,
+                scale=given.scale or "linear",
+                ratio_of=given.ratio,
+            )
+        elif given is not None and not isinstance(given, Equals):
             dimension, domain = meaning(name, kind)
             place = (*_PARAMETERS, name)
             found[name] = read_quantity(name, given, dimension, domain, place, units, faults)
     return found
-
-
-def read_ties(
-    model: MechanismModel,
-    kind: MechanismKind,
-    quantities: Mapping[str, float | Variable],
-    faults: Faults,
-) -> dict[str, str]:
-    """Tied parameters → the ones they equal. ``quantities``: the others, SI."""
-    found: dict[str, str] = {}
-    for name in kind.parameter_names():
-        given = model.parameters.get(name)
-        if not isinstance(given, Equals):
-            continue
-        wrong = _tie_fault(name, given.equals, model, kind, quantities)
-        if wrong is None:
-            found[name] = given.equals
-        else:
-            faults.add((*_PARAMETERS, name, "equals"), *wrong)
-    return found
-
-
-def _tie_fault(
-    name: str,
-    source: str,
-    model: MechanismModel,
-    kind: MechanismKind,
-    quantities: Mapping[str, float | Variable],
-) -> tuple[str, str] | None:
-    """What is wrong with ``name: {equals: source}`` and what to do about it, or None."""
-    if source == name:
-        return f"{name} equals itself", "Name another parameter, or give a number or a range."
-    further = model.parameters.get(source)
-    if isinstance(further, Equals):
-        return f"{name} equals {source}, which itself equals {further.equals}", "Name the last one directly."
-    if source not in quantities:
-        return (
-            f"{name} equals {shown(source)}, which this study does not give",
-            did_you_mean(source, quantities),
-        )
-    (dimension, domain), (other, _) = meaning(name, kind), meaning(source, kind)
-    if dimension != other:
-        return f"{name} is {_a(dimension)} and {source} is {_a(other)}", "Name one of the same kind."
-    if not within(domain, *interval(quantities[source])):
-        return (
-            f"{name} cannot take every value of {source}",
-            f"{name} must be {domain_words(domain)}: change the range of {source}.",
-        )
-    return None
-
-
-def _a(dimension: str) -> str:
-    return f"an {dimension}" if dimension == "angle" else f"a {dimension}"
 
 
 def _check_given(parameter: Parameter, kind: MechanismKind, given: Mapping[str, Any], faults: Faults) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
+from tpm_design.design_space import between
 from tpm_design.errors import did_you_mean
 from tpm_design.mechanisms.base import within
 from tpm_design.problem import Problem, Variable
@@ -138,7 +139,12 @@ class SweepReader:
                 steps = self._with_range(name, axis, (*place, name))
                 if steps is None:
                     continue
-                values, written[name] = _steps(steps), steps
+                logarithmic = name in self._variables and self._variables[name].scale == "log"
+                if logarithmic and steps.min is not None and steps.min <= 0.0:
+                    told = f"{name} is searched by its logarithm, and min {steps.min:g} has none"
+                    self._faults.add((*place, name), told, "Choose min above 0, or write {values: […]}.")
+                    continue
+                values, written[name] = _steps(steps, logarithmic=logarithmic), steps
             axes.append((name, tuple(self._value(name, value, (*place, name)) for value in values)))
         if math.prod(len(values) for _, values in axes) > LARGEST_GRID:
             self._faults.add(("sweep",), f"the grid has more than {LARGEST_GRID} designs", "Use fewer steps.")
@@ -149,8 +155,11 @@ class SweepReader:
         if axis.min is not None and name != "mode":
             return axis
         variable = self._variables.get(name)
-        if variable is None or variable.values:
-            self._faults.add(place, f"{name} has no range to divide", _axis_remedy(name, variable))
+        if variable is None or variable.values or variable.ratio_of:
+            what = f"{name} has no range to divide"
+            if variable is not None and variable.ratio_of:
+                what = f"{name} is a ratio of {variable.ratio_of} and has no range of its own to divide"
+            self._faults.add(place, what, _axis_remedy(name, variable))
             return None
         unit = si_unit(variable.dimension)
         low, high = (self._units.from_si(bound, unit) for bound in (variable.lower, variable.upper))
@@ -158,15 +167,16 @@ class SweepReader:
 
 
 def _axis_remedy(name: str, variable: Variable | None) -> str:
-    if variable is not None or name == "mode":
+    if name == "mode" or (variable is not None and variable.values):
         return "Write {values: […]}."
     return "Write {min: …, max: …, num: …} or {values: […]}."
 
 
-def _steps(axis: Steps) -> tuple[float, ...]:
+def _steps(axis: Steps, *, logarithmic: bool) -> tuple[float, ...]:
     low, high = axis.min or 0.0, axis.max or 0.0
     last = axis.num - 1
     # twelve digits: 0.1 + 0.2 shall read 0.3 in the study's units
     return tuple(
-        high if i == last else float(f"{low + (high - low) * i / last:.12g}") for i in range(axis.num)
+        high if i == last else float(f"{between(low, high, i / last, logarithmic=logarithmic):.12g}")
+        for i in range(axis.num)
     )

@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.design_space import DesignSpace, octant_signs, value_at
+from tpm_design.design_space import DesignSpace, Multiples, octant_signs, values_at
 from tpm_design.errors import UsageError
 from tpm_design.runs.sweeps import WHOLE, Point, Shard
-from tpm_design.study.design import choose_design
+from tpm_design.study.design import choose_design, completed_design, first_multiple
 from tpm_design.study.study import Study
 from tpm_design.study.sweep import GridSweep, ListSweep, SampleSweep, Sweep
 
@@ -51,10 +51,17 @@ def sweep_points(study: Study, shard: Shard = WHOLE) -> tuple[Point, ...]:
     are scrambled by the plan's seed. What a point does not name is held at its initial value, else the
     middle of its range, else the first value listed. Raises UsageError where there is no plan."""
     plan, problem = plan_of_sweep(study), study.problem
-    held, _ = choose_design(study, {})
+    held = completed_design(problem, {})
+    held_multiples = {
+        v.name: multiple for v in problem.variables if (multiple := first_multiple(v)) is not None
+    }
     space = DesignSpace(problem.variables, problem.fixed, octant_signs(problem.modes), problem.ties)
     chosen = itertools.islice(enumerate(_values(study, plan)), shard.index - 1, None, shard.count)
-    return tuple(Point(number, space.completed({**held, **values})) for number, values in chosen)
+    points = []
+    for number, (values, multiples) in chosen:
+        left = {name: multiple for name, multiple in held_multiples.items() if name not in values}
+        points.append(Point(number, space.completed({**held, **values}, {**left, **multiples})))
+    return tuple(points)
 
 
 def held_values(study: Study) -> tuple[str, ...]:
@@ -64,17 +71,18 @@ def held_values(study: Study) -> tuple[str, ...]:
     return tuple(line for line in assumptions if line.partition(" = ")[0] not in swept)
 
 
-def _values(study: Study, plan: Sweep) -> Iterator[Values]:
+def _values(study: Study, plan: Sweep) -> Iterator[tuple[Values, Multiples]]:
     if isinstance(plan, GridSweep):
         names = [name for name, _ in plan.axes]
         for combination in itertools.product(*(values for _, values in plan.axes)):
-            yield dict(zip(names, combination, strict=True))
+            yield dict(zip(names, combination, strict=True)), {}
     elif isinstance(plan, ListSweep):
-        yield from plan.points
+        for point in plan.points:
+            yield point, {}
     else:
         variables = [next(v for v in study.problem.variables if v.name == name) for name in plan.names]
         for row in _samples(plan):
-            yield {v.name: value_at(v, float(c)) for v, c in zip(variables, row, strict=True)}
+            yield values_at(variables, row)
 
 
 def _samples(plan: SampleSweep) -> NDArray[np.float64]:

@@ -45,7 +45,8 @@ units: {{length: mm, angle: deg}}    # of every number in this file; mm, cm, m, 
 mechanism:
   type: {kind.name}    # {kind.title}
   # number: fixed; {{min, max, initial}}: free, initial may be left out; {{values: [1, 2]}}: one of these;
-  # {{equals: f}}: always the value of f
+  # {{equals: f}}: always the value of f; {{ratio: f, min: 0.5, max: 2}}: free as a multiple of f;
+  # scale: log in a range: small values searched as finely as large ones
   parameters:
 {chr(10).join(lines)}{mode}{limits}
   limits: {{}}
@@ -54,7 +55,7 @@ objectives:
 {_objective(kind)}
 constraints:
 {chr(10).join(_constraints(kind))}
-optimizer: {{method: scipy.differential_evolution, budget: 400, seed: 1}}    # budget: designs evaluated
+optimizer: {{method: multistart, budget: 400, seed: 1}}    # budget: designs evaluated
 accuracy: {{volume: 1e-3}}    # relative error of volumes and averages
 """
 

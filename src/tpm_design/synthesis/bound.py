@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.design_space import octant_signs
+from tpm_design.design_space import octant_signs, with_changes
 from tpm_design.optimizers.conic import solve
-from tpm_design.problem import Design, Problem, with_ties
+from tpm_design.problem import Design, Problem
 from tpm_design.synthesis.relaxation import Relaxation, octants, refusal, relaxation
 
 FloatArray = NDArray[np.float64]
@@ -79,7 +79,7 @@ def _relaxed_designs(problem: Problem, start: Design) -> Iterator[Design]:
                 known[key] = _solved(relaxation(held, octant, inward=inward))
             found = known[key]
             if found is not None:
-                yield with_ties(problem.ties, {**start, **chosen, **found})
+                yield with_changes(problem, start, {**chosen, **found})
 
 
 def _solved(relaxed: Relaxation) -> dict[str, float] | None:

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpm_design.design_space import octant_signs
+from tpm_design.design_space import octant_signs, spans
 from tpm_design.errors import RefusedError
 from tpm_design.mechanisms.outer_reach import Affine, OuterReach
 from tpm_design.optimizers.conic import ConicProgram
-from tpm_design.problem import CENTRE, Goal, Problem
+from tpm_design.problem import CENTRE, Goal, Problem, Variable
 from tpm_design.synthesis.bodies import Body, body
 from tpm_design.synthesis.forms import Draft, Form, combined
 from tpm_design.workspace.regions import Box
@@ -108,6 +108,7 @@ def relaxation(problem: Problem, octant: Octant, *, inward: float = 0.0) -> Rela
     unit = max(region.extent, *(max(abs(low), abs(high)) for low, high in ranges.values()), 1e-300)
     draft = Draft(inward * unit, dict(ranges))
     centre = [_centre_form(problem, name, side) for name, side in zip(CENTRE, octant, strict=True)]
+    _state_ratios(draft, problem)
     _state_reach(draft, problem, reach, region, centre)
     _state_octant(draft, problem, reach, region, centre, octant)
     cost = _cost(problem)
@@ -118,17 +119,37 @@ def relaxation(problem: Problem, octant: Octant, *, inward: float = 0.0) -> Rela
 def _ranges(problem: Problem, octant: Octant) -> dict[str, tuple[float, float]]:
     """Ranges (m) of the free quantities that the program is about."""
     lengths = {p.name for p in problem.kind.parameters if p.dimension == "length"}
+    known = spans(_quantities(problem))
     found: dict[str, tuple[float, float]] = {}
     for variable in problem.variables:
         parameter = problem.kind.parameter(variable.name)
         if variable.name not in CENTRE and (parameter is None or parameter.name not in lengths):
             continue
-        ends = [float(value) for value in variable.values] or [variable.lower, variable.upper]
+        ends = list(known[variable.name])
         if variable.mirrored:
             side = octant[CENTRE.index(variable.name)] or 1.0
             ends = [side * end for end in ends]
         found[variable.name] = (min(ends), max(ends))
     return found
+
+
+def _quantities(problem: Problem) -> dict[str, float | Variable]:
+    """Fixed and free quantities that are numbers."""
+    fixed = {name: float(value) for name, value in problem.fixed.items() if not isinstance(value, str)}
+    return {**fixed, **{variable.name: variable for variable in problem.variables if variable.name != "mode"}}
+
+
+def _state_ratios(draft: Draft, problem: Problem) -> None:
+    """lower · source ≤ length ≤ upper · source for every length that is a ratio of another one."""
+    for variable in problem.variables:
+        source = variable.ratio_of
+        if source is None or variable.name not in draft.ranges:
+            continue
+        own = Form({variable.name: 1.0})
+        other = Form({source: 1.0}) if source in draft.ranges else Form({}, float(problem.fixed[source]))
+        for room in (own + other.times(-variable.lower), other.times(variable.upper) + own.times(-1.0)):
+            # ranges are met, not kept off
+            draft.at_least_zero(room + draft.inward)
 
 
 def _centre_form(problem: Problem, name: str, side: float) -> Form:
