@@ -88,6 +88,8 @@ def test_the_stroke_of_the_carriages_bounds_the_body() -> None:
     found = largest_body(built, built.mode_of({"elbows": "+++"}), "box")
     assert halves(found) == pytest.approx([0.2] * 3, rel=PRECISE)
     assert found is not None and found.centre == pytest.approx([0.1] * 3, rel=PRECISE)
+    # each face lies on a bound of its own
+    assert found.gap is not None and found.gap < PRECISE
 
 
 @pytest.mark.parametrize("name", ["box", "cylinder"])
