@@ -18,6 +18,7 @@ NAMES = (
     "certificate",
     "screening",
     "sweep",
+    "cluster",
     "study",
 )
 

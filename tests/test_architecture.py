@@ -60,16 +60,17 @@ OWNERS = {
     "typer": {"cli"},
     "rich": {"cli"},
     "nlopt": {"optimizers"},
+    "pymoo": {"optimizers", "runs"},
     "flint": {"checker"},
     "matplotlib": {"report"},
     "cvxpy": {"optimizers"},
 }
 """Libraries that only these rooms know."""
 
-LATE = {"pandas", "cvxpy", "nlopt", "rich", "scipy"}
+LATE = {"pandas", "cvxpy", "nlopt", "pymoo", "rich", "scipy"}
 """Libraries that are imported inside functions only, but for the report room, which is itself imported so."""
 
-SLOW = {"numba", "numpy", "scipy", "pandas", "matplotlib", "cvxpy", "nlopt", "ruamel.yaml"}
+SLOW = {"numba", "numpy", "scipy", "pandas", "matplotlib", "cvxpy", "nlopt", "pymoo", "ruamel.yaml"}
 
 
 def room_of(path: Path) -> str:
@@ -185,7 +186,7 @@ def test_reading_a_study_loads_no_library_of_searches_or_reports() -> None:
         "from tpm_design.cli import main\nmain()"
     )
     assert "tpm_design.study.resolve" in modules
-    assert modules & {"pandas", "matplotlib", "cvxpy", "nlopt", "scipy.optimize"} == set()
+    assert modules & {"pandas", "matplotlib", "cvxpy", "nlopt", "pymoo", "scipy.optimize"} == set()
 
 
 def test_importing_the_package_loads_nothing_else() -> None:

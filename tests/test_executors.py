@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 import threading
 from collections.abc import Iterator
@@ -18,7 +19,7 @@ from hypothesis import strategies as st
 from tpm_design.errors import RefusedError, RunStoppedError
 from tpm_design.mechanisms import MECHANISMS
 from tpm_design.problem import Problem, evaluate
-from tpm_design.runs.dask_workers import CHUNK_SECONDS, SCHEDULER_SECONDS, DaskWorkers
+from tpm_design.runs.dask_workers import CHUNK_SECONDS, HANDLING_SECONDS, DaskWorkers
 from tpm_design.runs.executors import AHEAD, Threads, in_order
 from tpm_design.runs.shipping import carried_out, packed, portable, unpacked
 from tpm_design.study import load_comparison, load_study
@@ -96,10 +97,10 @@ def test_chunks_are_as_long_as_they_may_be_and_no_longer(
     assert sum(sizes) == left or (sum(sizes) < left and len(sizes) == most)
     assert min(sizes) >= 1
     assert sizes == sorted(sizes, reverse=True)
-    longest = max(CHUNK_SECONDS, threads * SCHEDULER_SECONDS + each)
-    assert max(sizes) * each <= longest or max(sizes) == 1
-    # all workers have some of what is left, unless there are so many that the scheduler could not keep up
-    assert sizes[0] <= max(-(-left // (2 * threads)), threads * SCHEDULER_SECONDS / each + 1)
+    # nobody waits for long, and all workers have some, unless the scheduler could not keep up
+    cost = HANDLING_SECONDS / each
+    assert max(sizes) <= max(CHUNK_SECONDS / each, threads * cost) + 1
+    assert sizes[0] <= max(left / (2 * threads), math.sqrt(left * cost)) + 1
 
 
 def problems() -> Iterator[Problem]:

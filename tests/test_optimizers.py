@@ -179,8 +179,9 @@ REDUCER = Case(reducer, (0.5,) * 7, 2994.471, constraints=11, levels=(0, 0, 12, 
 
 
 def methods(wanted: Callable[[Optimizer], bool] = lambda method: True) -> pytest.MarkDecorator:
-    # one that solves a relaxation needs a study: tests/test_convex.py
-    chosen = [m for m in OPTIMIZERS.values() if wanted(m) and not m.abilities.relaxation]
+    # one that solves a relaxation needs a study, tests/test_convex.py; fronts: tests/test_front_methods.py
+    one_objective = [m for m in OPTIMIZERS.values() if not (m.abilities.relaxation or m.abilities.front)]
+    chosen = [method for method in one_objective if wanted(method)]
     return pytest.mark.parametrize("method", chosen, ids=lambda method: method.name)
 
 
@@ -194,7 +195,7 @@ def is_local(method: Optimizer) -> bool:
 
 def test_the_registry_holds_every_method_under_its_name() -> None:
     assert all(name == method.name for name, method in OPTIMIZERS.items())
-    assert {name.split(".")[0] for name in OPTIMIZERS} == {"multistart", "scipy", "nlopt", "convex"}
+    assert {name.split(".")[0] for name in OPTIMIZERS} == {"multistart", "scipy", "nlopt", "convex", "pymoo"}
     assert all(method.description and method.source for method in OPTIMIZERS.values())
 
 
@@ -434,7 +435,7 @@ def test_a_refused_local_method_is_answered_with_local_ones() -> None:
 def test_the_room_loads_no_library_before_a_search_runs() -> None:
     script = (
         "import sys, tpm_design; before = set(sys.modules); import tpm_design.optimizers;"
-        "print(sorted({'scipy', 'nlopt'} & (set(sys.modules) - before)))"
+        "print(sorted({'scipy', 'nlopt', 'pymoo'} & (set(sys.modules) - before)))"
     )
     sources = str(Path(__file__).parents[1] / "src")
     answer = subprocess.run(

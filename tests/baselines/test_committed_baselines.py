@@ -7,16 +7,20 @@ from pathlib import Path
 
 import pytest
 
+from tpm_design.baselines.deviations import Tolerance, compare_tables
 from tpm_design.baselines.folders import check_same_question, read_result
 from tpm_design.baselines.reproduction import reproduce
 from tpm_design.baselines.tables import read_table
-from tpm_design.runs.folder import DESIGNS
+from tpm_design.runs.folder import DESIGNS, TABLE
+from tpm_design.runs.sweeps import WHOLE
 from tpm_design.study import load_study
 from tpm_design.study.plain import dump_yaml
+from tpm_design.study.sweeping import sweep_study
 
 ROOT = Path(__file__).parents[2]
 BASELINES = ROOT / "results" / "baselines"
-ORTHOGLIDE = BASELINES / "orthoglide-velocity"
+ORTHOGLIDE, SWEEP = BASELINES / "orthoglide-velocity", BASELINES / "orthoglide-sweep"
+SEARCHES = sorted(path for path in BASELINES.iterdir() if not read_result(path).is_sweep)
 
 EDGE = 200.0
 # corners of the largest cube on the diagonal, where the factors 1/2 and 2 are attained, for a strut of 1
@@ -55,17 +59,61 @@ def test_every_number_of_the_orthoglide_is_the_closed_form() -> None:
         assert float(row[heading]) == pytest.approx(value, rel=3e-5), heading
 
 
-def test_the_baseline_asks_what_the_study_asks(tmp_path: Path) -> None:
-    baseline = read_result(ORTHOGLIDE)
+def closed_forms_on_the_diagonal(strut: float, first: float, last: float) -> dict[str, float]:
+    """Numbers of a cube between two corners (t, t, t), in mm.
+
+    Carriages move by (1 − u) v + u (v · 1) 1 where the tool moves by v, u = −t / √(L² − 2 t²): by 1 − u
+    times as much across the diagonal and 1 + 2 u times along it.
+    """
+    factors, spreads = [], []
+    for t in (first, last):
+        u = -t / math.sqrt(strut**2 - 2.0 * t**2)
+        at_corner = [1.0 / (1.0 - u), 1.0 / (1.0 + 2.0 * u)]
+        factors += at_corner
+        spreads.append(min(at_corner) / max(at_corner))
+    return {
+        "L [mm]": strut,
+        "total_link_length [mm]": 3.0 * strut,
+        "coverage [-]": 1.0,
+        "velocity_min [-]": min(factors),
+        "velocity_max [-]": max(factors),
+        "conditioning_min [-]": min(spreads),
+        "actuator_range [mm]": last + strut - first - math.sqrt(strut**2 - 2.0 * first**2),
+        "violation [-]": max(0.0, max(factors) - 2.0) + max(0.0, 0.5 - min(factors)),
+    }
+
+
+def test_every_number_of_the_sweep_is_the_closed_form() -> None:
+    table = read_table(SWEEP / TABLE)
+    assert len(table.rows) == 7
+    for number, row in enumerate(table.rows.values()):
+        expected = closed_forms_on_the_diagonal(310.0 + 15.0 * number, -125.0, 75.0)
+        expected |= {f"center_{axis} [mm]": -25.0 for axis in "xyz"}
+        assert set(expected) == {head for head in table.headings if "[" in head and "seconds" not in head}
+        for heading, value in expected.items():
+            assert float(row[heading]) == pytest.approx(value, rel=1e-8, abs=1e-12), heading
+        assert row["status"] == ("infeasible" if expected["violation [-]"] > 0.0 else "feasible")
+
+
+def test_the_present_program_gives_every_row_of_the_sweep(tmp_path: Path) -> None:
+    run = sweep_study(load_study(SWEEP / "study.yaml"), shard=WHOLE, workers=1, output=tmp_path)
+    assert run.folder is not None
+    before, now = (read_table(folder / TABLE) for folder in (SWEEP, run.folder))
+    assert compare_tables(before, now, Tolerance(1e-9, 1e-12).allowed).exceedances == ()
+
+
+@pytest.mark.parametrize("folder", [ORTHOGLIDE, SWEEP], ids=lambda path: path.name)
+def test_the_baseline_asks_what_the_study_asks(folder: Path, tmp_path: Path) -> None:
+    baseline = read_result(folder)
     study = load_study(ROOT / "studies" / "04-orthoglide-velocity.yaml")
-    for name in ("run.json", DESIGNS):
-        (tmp_path / name).write_bytes((ORTHOGLIDE / name).read_bytes())
+    for name in ("run.json", TABLE if baseline.is_sweep else DESIGNS):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
     (tmp_path / "study.yaml").write_text(dump_yaml(study.resolved()), encoding="utf-8")
     check_same_question(baseline, read_result(tmp_path))
 
 
-@pytest.mark.parametrize("folder", sorted(BASELINES.iterdir()), ids=lambda path: path.name)
-def test_the_present_program_gives_the_designs_of_every_baseline(folder: Path) -> None:
+@pytest.mark.parametrize("folder", SEARCHES, ids=lambda path: path.name)
+def test_the_present_program_gives_the_designs_of_every_search(folder: Path) -> None:
     found = reproduce(folder, allow_code=False)
     assert found.exceedances == ()
     assert found.rows >= 1

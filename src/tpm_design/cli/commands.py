@@ -13,6 +13,7 @@ from typing import Any
 
 from tpm_design.cli.comparison import comparison_text, worst_code, write_comparison
 from tpm_design.cli.evaluators import check_dask, evaluators
+from tpm_design.cli.front import front_data, front_text
 from tpm_design.cli.guard import INTERRUPTED, NOT_PROVED, NOTHING_FEASIBLE
 from tpm_design.cli.progress import search_progress
 from tpm_design.cli.results import design_rows, evaluation_data, limit_text, result_text
@@ -69,7 +70,7 @@ def validate_study(path: Path, *, resolved: bool, allow_code: bool, quiet: bool)
             print(f"{path} is valid: {', '.join(comparison.studies)}, asked the same.")
         return None
     study = load_study(path, allow_code=allow_code)
-    if study.problem.variables and len(study.problem.objectives) == 1:
+    if study.problem.variables:
         check_plan(study.problem, plan_of(study))
     if resolved:
         print(dump_yaml(study.resolved()), end="")
@@ -311,6 +312,8 @@ def _run_data(study: Study, run: Run) -> dict[str, Any]:
     data: dict[str, Any] = {"study": study.name, "run": str(run.folder), "status": run.status}
     if run.best is not None:
         data["best"] = evaluation_data(study.problem, study.units, run.best)
+    if len(study.problem.objectives) > 1:
+        data["front"] = front_data(study.problem, study.units, run.result.front)
     if run.result.bound is not None and run.result.bound.reachable:
         least = study.units.from_si(run.result.bound.least, "m")
         data["bound"] = {"value": least, "unit": study.units.name("m"), "gap": gap_of(run.result)}
@@ -323,6 +326,8 @@ def _run_text(study: Study, run: Run) -> str:
     from tpm_design.cli.certify import verdict_text
 
     parts = []
+    if run.result.front:
+        parts += [front_text(study.problem, study.units, run.result.front), "The knee:"]
     if run.best is not None and run.result.best is not None:
         parts += [
             result_text(study.problem, study.units, run.best),

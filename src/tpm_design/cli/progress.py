@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from tpm_design.problem import Problem
-from tpm_design.runs.search import Entry, minimised
+from tpm_design.runs.search import Entry, front_entries, minimised
 from tpm_design.runs.tables import goal_unit
 from tpm_design.units import Units
 
@@ -53,11 +53,12 @@ def _progress(
 
 
 class _Best:
-    """The best objective so far, as text."""
+    """The best objective so far, or the size of the front, as text."""
 
     def __init__(self, problem: Problem, units: Units) -> None:
         self._problem, self._units = problem, units
         self._goal = problem.objectives[0]
+        self._front: list[Entry] = []
         self._feasible = float("inf")
         self._violation = float("inf")
         self._round = 1
@@ -68,9 +69,13 @@ class _Best:
             self._round, self._feasible, self._violation = entry.round, float("inf"), float("inf")
         if entry.evaluation.status == "feasible":
             self._feasible = min(self._feasible, minimised(self._problem, entry.evaluation))
+            if len(self._problem.objectives) > 1:
+                self._front = front_entries(self._problem, [*self._front, entry])
         if entry.evaluation.status != "aborted":
             self._violation = min(self._violation, entry.evaluation.violation)
         before = f"round {self._round}: " if self._round > 1 else ""
+        if self._front:
+            return f"front of {len(self._front)}"
         if self._feasible < float("inf"):
             sign = 1.0 if self._goal.sense == "minimize" else -1.0
             value = sign * self._feasible * self._goal.metric.scale

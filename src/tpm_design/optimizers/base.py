@@ -26,12 +26,16 @@ class Outcomes:
     """Values at N points: ``objective`` (N,) to minimise, ``constraints`` (N, m) met where ≥ 0 (each
     divided by its metric's scale), ``merit`` (N,) = objective + exact penalty, finite everywhere.
     ``aborted`` (N,), or empty for none: points that a ``ScreeningSearch`` did not measure to the end. What is
-    not known of them is 0 of a constraint, and their merit is behind those that were asked for."""
+    not known of them is 0 of a constraint, and their merit is behind those that were asked for.
+    Of a ``FrontSearch``: ``objectives`` (N, k), all of them, each to minimise, and ``objective_pieces``: for
+    each of them an array (N, s) whose greatest value it is, smoother in the design."""
 
     objective: FloatArray
     constraints: FloatArray
     merit: FloatArray
     aborted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    objectives: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    objective_pieces: tuple[FloatArray, ...] = ()
 
 
 class Search(Protocol):
@@ -65,6 +69,18 @@ class ScreeningSearch(Search, Protocol):
         ...
 
 
+@runtime_checkable
+class FrontSearch(Search, Protocol):
+    """A search that tells all its objectives."""
+
+    @property
+    def objective_count(self) -> int: ...
+
+    def in_pieces(self) -> FrontSearch:
+        """The same search, constraints and objectives in as many pieces as a known point has of each."""
+        ...
+
+
 @dataclass(frozen=True)
 class Abilities:
     """What a method can work with.
@@ -73,7 +89,8 @@ class Abilities:
     may be given variables with levels. ``derivatives``: it follows gradients, so every metric must be
     differentiable. ``random``: its path depends on the seed. ``whole_space``: global, as opposed to
     local from ``start``. ``batch``: it evaluates whole populations at once, so workers help.
-    ``relaxation``: it solves a convex relaxation of the problem, which must have one.
+    ``relaxation``: it solves a convex relaxation of the problem, which must have one. ``front``: it
+    searches the front of two objectives or more, and only that; at most ``most_objectives``.
     """
 
     constraints: bool
@@ -85,6 +102,8 @@ class Abilities:
     smallest_dimension: int = 1
     largest_dimension: int | None = None
     relaxation: bool = False
+    front: bool = False
+    most_objectives: int | None = None
 
 
 @dataclass(frozen=True)

@@ -92,39 +92,56 @@ def multistart(search: Search, seed: int) -> str:
     return _Course(search, seed).run()
 
 
+class _UnderWay:
+    """A task, the points it waits for, and the best feasible place it saw."""
+
+    def __init__(self, task: Task, asked: FloatArray) -> None:
+        self._task, self.asked, self.over = task, asked, False
+        self.best: Place | None = None
+
+    def go_on(self, found: Outcomes) -> None:
+        """Hand over the outcomes and wait for the next points."""
+        for place in places(self.asked, found):
+            if place.violation == 0.0 and (self.best is None or place.before(self.best)):
+                self.best = place
+        try:
+            self.asked = self._task.send(found)
+        except StopIteration:
+            self.over = True
+
+
 class _Course:
     def __init__(self, search: Search, seed: int) -> None:
         self._search = search
         self._whole = self._pieces = Watch(search)
         self._levels = self._whole.levels
         self._free = np.flatnonzero(self._levels == 0)
+        self._designs = np.inf if len(self._free) else prod(self._levels.tolist())
         self._random = np.random.default_rng(seed)
         self._starts = Starts(self._whole, seed)
         self._optima: list[Optimum] = []
         self._begun = self._ended = self._landed = self._hops = 0
         self._finishing = False
+        self._left: list[Place] = []
 
     def run(self) -> str:
         self._starts.sample()
-        under_way: list[tuple[Task, FloatArray]] = []
-        while not self._converged():
+        under_way: list[_UnderWay] = []
+        while not self._few_left() and not self._converged():
             while len(under_way) < ABREAST:
                 task = self._next_task()
                 if (first := next(task, None)) is not None:
-                    under_way.append((task, first))
-            points = np.vstack([asked for _, asked in under_way])
-            found = self._evaluated(points)
-            going_on, place = [], 0
-            for task, asked in under_way:
-                part = slice(place, place + len(asked))
-                place += len(asked)
-                answer = Outcomes(found.objective[part], found.constraints[part], found.merit[part])
-                try:
-                    going_on.append((task, task.send(answer)))
-                except StopIteration:
-                    continue
-            under_way = going_on
-        if not len(self._free) and self._enumerate():
+                    under_way.append(_UnderWay(task, first))
+            found = self._evaluated(np.vstack([one.asked for one in under_way]))
+            place = 0
+            for one in under_way:
+                part = slice(place, place + len(one.asked))
+                place += len(one.asked)
+                one.go_on(Outcomes(found.objective[part], found.constraints[part], found.merit[part]))
+            self._left = [*self._left, *(one.best for one in under_way if one.over and one.best)]
+            under_way = [one for one in under_way if not one.over]
+        if self._designs <= ENUMERATED:
+            self._enumerate()
             return "Converged: every design was evaluated."
         hits = sum(optimum.hits for optimum in self._best_ones())
         return f"Converged: {hits} of {self._landed} independent local searches ended at the best objective."
@@ -143,6 +160,11 @@ class _Course:
 
     def _next_task(self) -> Task:
         best = self._best()
+        while self._left:
+            left = self._left.pop()
+            if best is None or left.improves(best.place):
+                self._left = []
+                return self._from_left(left)
         if self._ended >= FIRST_STARTS and best is not None:
             if not best.finished and not self._finishing:
                 return self._finish(best)
@@ -157,6 +179,12 @@ class _Course:
         landing = yield from self._descended(start, RADIUS)
         self._ended += 1
         yield from self._arrived(landing, independent=True)
+
+    def _from_left(self, left: Place) -> Task:
+        """From the best place that a search saw, where that is better than any optimum: it went elsewhere."""
+        start = yield from looked_at(left.point)
+        landing = yield from self._descended(start, POLISH_RADII[0])
+        yield from self._arrived(landing, independent=False)
 
     def _hop(self, best: Optimum) -> Task:
         sigma = HOPS[self._hops // 2 % len(HOPS)]
@@ -259,14 +287,16 @@ class _Course:
             ordered = sorted(self._optima, key=lambda optimum: optimum.place.objective)
             self._search.note_optima(np.array([optimum.place.point for optimum in ordered]))
 
-    def _enumerate(self) -> bool:
-        """Evaluate every design where there are few."""
+    def _few_left(self) -> bool:
+        """Whether it is time to evaluate every design: after a few local searches, or a sample as large."""
+        return self._designs <= min(ENUMERATED, 2 * self._starts.batch) or (
+            self._designs <= ENUMERATED and self._ended >= FIRST_STARTS
+        )
+
+    def _enumerate(self) -> None:
         counts = self._levels.tolist()
-        if prod(counts) > ENUMERATED:
-            return False
         numbers = np.indices(counts).reshape(len(counts), -1).T
         self._whole.evaluate((numbers + 0.5) / self._levels)
-        return True
 
 
 METHODS = (

@@ -42,14 +42,14 @@ class Starts:
 
         self._search, self._levels = search, search.levels
         self._sequence = qmc.Sobol(search.dimension, scramble=True, rng=seed)
-        self._batch = 2 ** ceil(log2(SAMPLES * (search.dimension + 1)))
+        self.batch = 2 ** ceil(log2(SAMPLES * (search.dimension + 1)))
         self._samples: list[Place] = []
         self._used: list[FloatArray] = []
         self._apart = APART * np.sqrt(search.dimension)
 
     def sample(self) -> None:
         """Evaluate another batch."""
-        points = self._sequence.random(self._batch)
+        points = self._sequence.random(self.batch)
         if not self._samples:
             points = np.vstack([self._search.start, points])
         points = np.where(self._levels > 0, self._centred(points), points)

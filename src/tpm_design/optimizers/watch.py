@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpm_design.optimizers.base import FloatArray, Outcomes, ScreeningSearch, Search, Stalled
+from tpm_design.errors import RefusedError
+from tpm_design.optimizers.base import FloatArray, FrontSearch, Outcomes, ScreeningSearch, Search, Stalled
 
 LOCAL_STEP = 0.05
 """First step of local methods, as a share of each variable's range: chosen on constrained problems in seven
@@ -120,6 +121,12 @@ class Watch:
             jacobian=((constraints[1 : 1 + size] - constraints[1 + size :]) / width[:, None]).T,
         )
 
+    def see_pieces(self) -> None:
+        """From here on constraints and objectives in as many pieces as a known point has of each."""
+        if isinstance(self.search, FrontSearch):
+            self.search = self.search.in_pieces()
+            self.constraint_count = self.search.constraint_count
+
     def _note(self, points: FloatArray) -> None:
         """Counts points in a row that were all known before; a level counts as one value."""
         levels = np.maximum(self.levels, 1)
@@ -133,6 +140,13 @@ class Watch:
                 self._repeats = 0
         if self._repeats > REPEATS_ALLOWED:
             raise Stalled("Nothing left to try: every further point had been evaluated before.")
+
+
+def objective_count(watch: Watch) -> int:
+    """How many objectives a search has. Raises RefusedError where it tells only one."""
+    if not isinstance(watch.search, FrontSearch):
+        raise RefusedError("This search has one objective.", remedy="Choose a method for one objective.")
+    return watch.search.objective_count
 
 
 def watched(method: Callable[[Watch, int], str]) -> Callable[[Search, int], str]:

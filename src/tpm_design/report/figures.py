@@ -10,6 +10,15 @@ from matplotlib.figure import Figure
 from tpm_design.metrics.context import Context
 from tpm_design.report.convergence import convergence_figure, convergence_finding
 from tpm_design.report.drawing import mechanism_figure
+from tpm_design.report.front_figures import (
+    box_of,
+    front_figure,
+    front_finding,
+    hypervolume_course,
+    hypervolume_figure,
+    hypervolume_finding,
+    reference_text,
+)
 from tpm_design.report.good_pose import good_pose
 from tpm_design.report.maps import conditioning_figure, workspace_figure
 from tpm_design.report.reported import Reported, best_context
@@ -36,11 +45,13 @@ class Picture:
 def pictures(reported: Reported) -> tuple[Picture, ...]:
     """What there is to draw of a run, in the order of the report."""
     rooms = rooms_figure(reported)
-    course = None if reported.swept else convergence_figure(reported)
+    # the course of one objective says little of a front; of a search that found none it shows the violation
+    course = None if reported.swept or reported.front else convergence_figure(reported)
     context = best_context(reported)
     found = [] if context is None else _drawings(context, reported.study.units)
     if reported.swept:
         found += _sweep_pictures(reported)
+    found += _front_pictures(reported)
     found += _slice_pictures(reported)
     if rooms is not None:
         found.append(
@@ -76,6 +87,27 @@ def _drawings(context: Context, units: Units) -> list[Picture]:
             caption = "Limb 1 carries the names and its own dimensions; the links are to scale."
             return [Picture(DRAWING, f"{machine.kind.title} {where}", caption, figure)]
     return []
+
+
+def _front_pictures(reported: Reported) -> list[Picture]:
+    figure = front_figure(reported)
+    if figure is None:
+        return []
+    caption = (
+        "Nothing on the front is better by one objective without being worse by another. Star: the knee, "
+        "farthest from the straight line (with more objectives: the plane) through the extremes, each "
+        "objective as a share of its range; diamonds: the best by each objective."
+    )
+    found = [Picture("front.png", front_finding(reported), caption, figure)]
+    box, grown = box_of(reported), hypervolume_figure(reported)
+    if box is not None and grown is not None:
+        caption = (
+            "The share dominated of the box between the best of each objective and the reference point, 10 % "
+            f"of the front's range beyond its worst: {reference_text(reported, box)}."
+        )
+        finding = hypervolume_finding(reported, hypervolume_course(reported, box))
+        found.append(Picture("hypervolume.png", finding, caption, grown))
+    return found
 
 
 def _sweep_pictures(reported: Reported) -> list[Picture]:

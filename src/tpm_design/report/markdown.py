@@ -11,6 +11,7 @@ from tpm_design.problem import Evaluation, Goal
 from tpm_design.report.certified import certificate_lines
 from tpm_design.report.escape import code, code_cell, table, text
 from tpm_design.report.figures import DRAWING, FIGURES, Picture
+from tpm_design.report.fronts import front_lines
 from tpm_design.report.readings import AT_BOUND, at_end, limiting, nearest_constraint, readings
 from tpm_design.report.reported import Reported
 from tpm_design.report.swept import sweep_lines
@@ -44,6 +45,7 @@ def report_markdown(reported: Reported, pictures: Sequence[Picture]) -> str:
         _head(reported),
         _question(reported),
         sweep_lines(reported) if reported.swept else [],
+        front_lines(reported),
         _design(reported),
         _figures("Mechanism", [picture for picture in pictures if picture.file == DRAWING]),
         _metrics(reported),
@@ -68,6 +70,11 @@ def status_text(reported: Reported) -> str:
         return f"{start}No design was evaluated."
     number = reported.best.number
     if reported.feasible:
+        if reported.front:
+            return (
+                f"{start}Front of {len(reported.front)} designs from the {count} evaluations in the log; "
+                f"its knee is number {number}."
+            )
         return f"{start}Best feasible design of the {count} evaluations in the log: number {number}."
     return f"{start}None of the {count} designs in the log is feasible; the closest is number {number}."
 
@@ -153,7 +160,8 @@ def _design(reported: Reported) -> list[str]:
                 text(meaning),
             ]
         )
-    word = "Best design" if reported.feasible else "Closest design, not feasible"
+    best = "Knee of the front" if reported.front else "Best design"
+    word = best if reported.feasible else "Closest design, not feasible"
     headings = ["parameter", "value", "unit", "range", "meaning"]
     return [f"## {word} (number {reported.best.number})", "", *table(headings, rows)]
 
@@ -339,7 +347,8 @@ def _caveats(reported: Reported) -> list[str]:
         "only on the unfavourable side of its error.",
         f"- Volumes and averages aim at a relative error of {reported.problem.accuracy.volume:g}; the "
         f"region is sampled at {reported.problem.accuracy.region_samples} poses along its longest edge.",
-        "- The best design is the best one evaluated; no claim is made that none is better.",
+        f"- The {'front holds the best designs' if reported.front else 'best design is the best one'} "
+        "evaluated; no claim is made that none is better.",
         "- Axes are taken as exact and links as rigid.",
     ]
 

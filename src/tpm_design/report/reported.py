@@ -9,7 +9,7 @@ from tpm_design.errors import ParameterError
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Problem, design_context
 from tpm_design.runs.folder import STUDY, StoredRun, read_run
-from tpm_design.runs.search import Entry, best_entry
+from tpm_design.runs.search import Entry, best_entry, front_entries
 from tpm_design.study import Study, load_study
 from tpm_design.study.sweep_points import sweep_points
 
@@ -17,12 +17,14 @@ from tpm_design.study.sweep_points import sweep_points
 @dataclass(frozen=True)
 class Reported:
     """A run and the study it answers. ``best``: the best feasible entry, else the one of least violation;
-    None where nothing was evaluated. ``swept``: whether it is a sweep and no search."""
+    None where nothing was evaluated. ``swept``: whether it is a sweep and no search. ``front``: of a search
+    with several objectives, best first by the first; ``best`` is then its knee."""
 
     study: Study
     run: StoredRun
     best: Entry | None
     swept: bool
+    front: tuple[Entry, ...]
 
     @property
     def problem(self) -> Problem:
@@ -43,7 +45,10 @@ def read_reported(folder: Path, *, allow_code: bool = False) -> Reported:
     UsageError, StudyError or PlugInError."""
     run = read_run(folder)
     study = load_study(folder / STUDY, allow_code=allow_code)
-    return Reported(study, run, run.best or best_entry(study.problem, run.entries), _is_sweep(study, run))
+    swept = _is_sweep(study, run)
+    several = len(study.problem.objectives) > 1 and not swept
+    front = tuple(front_entries(study.problem, run.entries)) if several else ()
+    return Reported(study, run, run.best or best_entry(study.problem, run.entries), swept, front)
 
 
 def _is_sweep(study: Study, run: StoredRun) -> bool:

@@ -37,9 +37,9 @@ CHUNK_SECONDS = 0.25
 """What a chunk takes, far from the end of the items: long against the milliseconds that it costs, short for
 whoever has to wait for it, or to do it again."""
 
-SCHEDULER_SECONDS = 0.002
-"""Least time between two chunks on average over all workers, so that a scheduler, which takes a millisecond
-for one, keeps up with any number of workers."""
+HANDLING_SECONDS = 0.004
+"""What scheduler and driver may take for a chunk, twice what they do. Chunks are so large that they keep up
+with any number of workers, and that what a few items take is not spent on handing them out one by one."""
 
 FIRST_GUESS = 0.05
 """Seconds of an item before any has ended."""
@@ -152,12 +152,13 @@ class DaskWorkers:
         """Sizes of the next chunks, at most so many: smaller towards the end, so that all workers end
         together."""
         each = max(median(self._means) if self._means else FIRST_GUESS, 1e-6)
-        least = math.ceil(self._threads * SCHEDULER_SECONDS / each)
-        longest = max(least, int(CHUNK_SECONDS / each))
+        cost = HANDLING_SECONDS / each
+        longest = math.ceil(max(self._threads * cost, CHUNK_SECONDS / each))
         sizes: list[int] = []
         while left and len(sizes) < most:
-            share = math.ceil(left / (2 * self._threads))
-            sizes.append(min(left, max(least, min(longest, share))))
+            least = min(self._threads * cost, math.sqrt(left * cost))
+            share = min(longest, left / (2 * self._threads))
+            sizes.append(min(left, math.ceil(max(least, share))))
             left -= sizes[-1]
         return sizes
 

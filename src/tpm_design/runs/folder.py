@@ -32,7 +32,7 @@ STUDY, TABLE, LOG, DESIGNS, SUMMARY = (
 UNFINISHED = "unfinished"
 """``ending`` in run.json from the start of a run until it is over."""
 
-LIBRARIES = ("tpm-design", "numpy", "scipy", "numba", "nlopt", "pandas")
+LIBRARIES = ("tpm-design", "numpy", "scipy", "numba", "nlopt", "pymoo", "pandas")
 
 
 def create_run_folder(results: Path, study_name: str, study_hash: str) -> Path:
@@ -125,12 +125,14 @@ def _log_line(entry: Entry) -> str:
 
 def entry_to_json(entry: Entry) -> dict[str, Any]:
     """An evaluation with exact floats; a violation without a number becomes null."""
-    data = asdict(entry.evaluation)
+    # a copy of everything, as asdict makes it, takes longer than all the rest
+    data = dict(vars(entry.evaluation))
     data["violation"] = data["violation"] if math.isfinite(data["violation"]) else None
     data["metrics"] = {k: v if math.isfinite(v) else None for k, v in data["metrics"].items()}
     data["errors"] = {k: v if math.isfinite(v) else None for k, v in data["errors"].items()}
-    if data["cutoff"] is None:
-        del data["cutoff"]
+    cutoff = data.pop("cutoff")
+    if cutoff is not None:
+        data["cutoff"] = asdict(cutoff)
     judged_by = {"judged_by": entry.judged_by} if entry.judged_by else {}
     return {"id": entry.number, "round": entry.round, **judged_by, **data}
 

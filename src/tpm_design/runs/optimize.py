@@ -16,7 +16,7 @@ from tpm_design.problem import Goal, Problem, Sample
 from tpm_design.runs.executors import Executor
 from tpm_design.runs.optima import distinct_optima
 from tpm_design.runs.replay import answers_in, left_over
-from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch, best_entry
+from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch, best_entry, front_entries
 from tpm_design.synthesis.bound import ReachBound
 from tpm_design.synthesis.relaxation import checked_relaxation
 
@@ -72,7 +72,8 @@ class SearchResult:
     ``status``: one or more sentences with what to do where the result is not what was hoped for.
     ``rounds`` and ``verdict`` (on ``best``): of a search that certifies, as far as it came. ``bound``: on the
     objective, where the problem has a convex relaxation. ``optima``: the best entry and every other local
-    optimum that the method noted, best first."""
+    optimum that the method noted, best first. ``front``: of several objectives, best first by the first, and
+    ``best`` its knee; empty for one and where nothing is feasible."""
 
     entries: tuple[Entry, ...]
     best: Entry | None
@@ -83,15 +84,11 @@ class SearchResult:
     verdict: Verdict | None = None
     bound: ReachBound | None = None
     optima: tuple[Entry, ...] = ()
+    front: tuple[Entry, ...] = ()
 
 
 def check_plan(problem: Problem, plan: SearchPlan) -> None:
     """Refuse what cannot work before anything runs. Raises RefusedError or UsageError."""
-    if len(problem.objectives) != 1:
-        raise RefusedError(
-            f"The study has {len(problem.objectives)} objectives; the methods here take one.",
-            remedy="Keep one objective and make the others constraints.",
-        )
     if not problem.variables:
         raise RefusedError(
             "Nothing is free in this study.", remedy="Give a parameter {min, max}, or use `evaluate`."
@@ -100,10 +97,21 @@ def check_plan(problem: Problem, plan: SearchPlan) -> None:
     rough = [goal.label for goal in goals if not goal.metric.differentiable]
     discrete = [variable.name for variable in problem.variables if variable.values]
     method = optimizer(plan.method)
-    check_pair(method, dimension=len(problem.variables), discrete=discrete, nondifferentiable=rough)
+    check_pair(
+        method,
+        dimension=len(problem.variables),
+        discrete=discrete,
+        nondifferentiable=rough,
+        objectives=len(problem.objectives),
+    )
     if method.abilities.relaxation:
         checked_relaxation(problem)
     if plan.polish is not None:
+        if method.abilities.front:
+            raise RefusedError(
+                f"{plan.polish} improves one objective; {method.name} searches a front.",
+                remedy="Remove the polish.",
+            )
         polish = optimizer(plan.polish)
         if polish.abilities.whole_space:
             raise RefusedError(
@@ -146,7 +154,9 @@ def search(
     best = best_entry(problem, entries)
     status = status_sentence(problem, best, entries, ending, detail)
     optima = distinct_optima(problem, space_of(problem), best, entries, log.optima)
-    return SearchResult(entries, best, ending, status, remarks_on(plan, problem), optima=optima)
+    front = tuple(front_entries(problem, entries)) if len(problem.objectives) > 1 else ()
+    remarks = remarks_on(plan, problem)
+    return SearchResult(entries, best, ending, status, remarks, optima=optima, front=front)
 
 
 def space_of(problem: Problem) -> DesignSpace:
@@ -267,6 +277,11 @@ def status_sentence(
     remedy = REMEDIES.get(ending, "")
     if best.evaluation.status == "feasible":
         found = f"Best feasible design of {count} evaluations: number {best.number}."
+        if len(problem.objectives) > 1:
+            front = front_entries(problem, entries)
+            found = (
+                f"Front of {len(front)} designs from {count} evaluations; its knee is number {best.number}."
+            )
         return " ".join(filter(None, [detail, remedy, found, *_failures(entries)]))
     limit = binding(problem, best)
     label = limit[0].label if limit else "the objective"

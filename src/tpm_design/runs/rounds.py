@@ -281,13 +281,21 @@ def _corner(
 
 
 def _told(rounds: Sequence[Round], found: Verdict | None, proving: Proving) -> list[str]:
-    """Sentences on what was proved, with a remedy where not all was."""
+    """Sentences on what was proved, and in which round, with a remedy where not all was."""
     if found is None:
         return ["Nothing was certified."]
     certified = next(r for r in reversed(rounds) if r.best is not None and r.outcome == found.outcome)
+    lines = told_of(found, proving, where=f" in round {certified.number}")
+    if found.outcome != "proved" and rounds[-1].outcome == "infeasible":
+        lines.insert(1, f"Round {rounds[-1].number} found no feasible design that holds there as well.")
+    return lines
+
+
+def told_of(found: Verdict, proving: Proving, *, where: str = "") -> list[str]:
+    """Sentences on a verdict, a remedy last where not all was proved. ``where``: in which round it was."""
     within = "within the tolerances" if any(proving.tolerance.values()) else "of exactly these dimensions"
     if found.outcome == "proved":
-        return [f"Proved in round {certified.number} for every machine {within}."]
+        return [f"Proved{where} for every machine {within}."]
     failed = [r for r in found.requirements if r.outcome == found.outcome]
     labels = ", ".join(requirement.goal.label for requirement in failed)
     lines = []
@@ -297,8 +305,6 @@ def _told(rounds: Sequence[Round], found: Verdict | None, proving: Proving) -> l
     else:
         reasons = "; ".join(f"{r.goal.label} ({r.reason})" for r in failed)
         lines.append(f"Not proved for every machine {within}: {reasons}.")
-    if rounds[-1].outcome == "infeasible":
-        lines.append(f"Round {rounds[-1].number} found no feasible design that holds there as well.")
     if not any(r.settlements for r in failed):
         return [*lines, f"Nothing here proves {labels}: record it instead of asking for it."]
     remedies = [f"raise the budget, ask for less of {labels}"]

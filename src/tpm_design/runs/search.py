@@ -28,6 +28,7 @@ from tpm_design.problem import (
     scaled_objective,
 )
 from tpm_design.runs.executors import Executor, Threads, in_order
+from tpm_design.runs.front import knee, non_dominated
 from tpm_design.synthesis.bound import relaxed_designs
 
 FloatArray = NDArray[np.float64]
@@ -163,13 +164,14 @@ class EvaluationLog:
 @dataclass(frozen=True)
 class UnitSearch:
     """A ``Search`` over a design space, up to ``limit`` entries in the log. ``sizes``: in how many smooth
-    pieces each constraint is given to the optimiser."""
+    pieces each constraint is given to the optimiser; ``objective_sizes``: each objective, empty for one."""
 
     log: EvaluationLog
     space: DesignSpace
     start: FloatArray
     limit: int
     sizes: tuple[int, ...]
+    objective_sizes: tuple[int, ...] = ()
 
     @property
     def dimension(self) -> int:
@@ -183,11 +185,15 @@ class UnitSearch:
     def constraint_count(self) -> int:
         return sum(self.sizes)
 
+    @property
+    def objective_count(self) -> int:
+        return len(self.log.problem.objectives)
+
     def evaluate(self, points: FloatArray) -> Outcomes:
         """Values at ``points`` (N, n). Raises BudgetSpent."""
         table = np.atleast_2d(np.asarray(points, dtype=np.float64))
         results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
-        return outcomes(self.log.problem, results, self.sizes)
+        return outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
 
     def screen(self, points: FloatArray, keep: int) -> Outcomes:
         """As ``ScreeningSearch``. The cutoff of each ``SCREENED`` points is the best ``keep``-th of those
@@ -201,9 +207,14 @@ class UnitSearch:
         return outcomes(self.log.problem, results, self.sizes)
 
     def in_pieces(self) -> UnitSearch:
-        """The same search, each constraint in as many smooth pieces as a design in the log had."""
-        most = self.log.most_pieces
-        return replace(self, sizes=tuple(most.get(goal.label, 1) for goal in self.log.problem.constraints))
+        """The same search, each constraint and objective in as many smooth pieces as a design in the log
+        had."""
+        most, problem = self.log.most_pieces, self.log.problem
+        return replace(
+            self,
+            sizes=tuple(most.get(goal.label, 1) for goal in problem.constraints),
+            objective_sizes=tuple(most.get(goal.label, 1) for goal in problem.objectives),
+        )
 
     def note_optima(self, points: FloatArray) -> None:
         """The local optima (N, n) that the method knows by now."""
@@ -247,8 +258,13 @@ def cutoff_at(problem: Problem, results: Sequence[Evaluation], keep: int) -> Cut
 
 
 def best_entry(problem: Problem, entries: Iterable[Entry]) -> Entry | None:
-    """The feasible entry of least objective in the last round that has one, else the one of least violation;
-    None if there is none."""
+    """The feasible entry of least objective in the last round that has one, of several objectives the knee of
+    the front; else the one of least violation. None if there is none."""
+    if len(problem.objectives) > 1:
+        entries = tuple(entries)
+        front = front_entries(problem, entries)
+        if front:
+            return front[knee(np.array([scaled_objectives(problem, e.evaluation) for e in front]))]
 
     def key(entry: Entry) -> tuple[int, tuple[float, float, int]]:
         feasible = entry.evaluation.status == "feasible"
@@ -260,6 +276,16 @@ def best_entry(problem: Problem, entries: Iterable[Entry]) -> Entry | None:
 def answer_key(entry: Entry) -> AnswerKey:
     """What an entry answers."""
     return entry.judged_by, design_key(entry.evaluation.design), entry.evaluation.cutoff
+
+
+def front_entries(problem: Problem, entries: Iterable[Entry]) -> list[Entry]:
+    """The feasible entries that no other one betters in all objectives, best first by the first objective. Of
+    entries that are equal in all of them the first."""
+    feasible = [entry for entry in entries if entry.evaluation.status == "feasible"]
+    if not feasible:
+        return []
+    values = np.array([scaled_objectives(problem, entry.evaluation) for entry in feasible])
+    return [feasible[row] for row in non_dominated(values)]
 
 
 def design_key(design: Design) -> Key:
@@ -277,18 +303,34 @@ def samples_digest(samples: Sequence[Sample]) -> str:
 
 def minimised(problem: Problem, evaluation: Evaluation) -> float:
     """The first objective over its scale, turned so that less is better; FAILED where there is none."""
-    goal = problem.objectives[0]
+    return scaled_objectives(problem, evaluation)[0]
+
+
+def scaled_objectives(problem: Problem, evaluation: Evaluation) -> tuple[float, ...]:
+    """Every objective over its scale, turned so that less is better; FAILED where there is none."""
+    return tuple(_minimised(goal, evaluation) for goal in problem.objectives)
+
+
+def _minimised(goal: Goal, evaluation: Evaluation) -> float:
     value = evaluation.metrics.get(goal.label, math.nan)
     if not math.isfinite(value):
         return FAILED
     return scaled_objective(goal, value)
 
 
-def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[int]) -> Outcomes:
+def outcomes(
+    problem: Problem,
+    results: Sequence[Evaluation],
+    sizes: Sequence[int],
+    objective_sizes: Sequence[int] = (),
+) -> Outcomes:
     """What an optimiser gets to see, finite everywhere. ``sizes``: number of pieces of each constraint; a
-    constraint of fewer pieces repeats its least. Of aborted evaluations constraints that were not measured
-    are 0, and the merit is behind that of the cutoff."""
-    objective = np.array([minimised(problem, result) for result in results])
+    constraint of fewer pieces repeats its least. ``objective_sizes``: of each objective, by default one.
+    Constraints that were not measured, of aborted evaluations, are 0, and the merit is behind that of the
+    cutoff."""
+    objectives = np.array([scaled_objectives(problem, result) for result in results])
+    objectives = objectives.reshape(len(results), len(problem.objectives))
+    objective = objectives[:, 0]
     constraints = np.array(
         [
             [
@@ -302,9 +344,23 @@ def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[in
     violation = np.array(
         [result.violation if math.isfinite(result.violation) else FAILED for result in results]
     )
+    pieces = tuple(
+        np.array([_objective_pieces(goal, result, size) for result in results]).reshape(len(results), size)
+        for goal, size in zip(
+            problem.objectives, objective_sizes or (1,) * len(problem.objectives), strict=True
+        )
+    )
     aborted = np.array([result.cutoff is not None for result in results], dtype=np.bool_)
     merit = np.where(aborted, FAILED, objective) + PENALTY * violation
-    return Outcomes(objective, constraints, merit, aborted)
+    return Outcomes(objective, constraints, merit, aborted, objectives=objectives, objective_pieces=pieces)
+
+
+def _objective_pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:
+    """Values of which the greatest is the objective; its own one ``size`` times where there are no such."""
+    value = _minimised(goal, result)
+    sign = (1.0 if goal.sense == "minimize" else -1.0) / goal.metric.scale
+    pieces = tuple(sign * piece for piece in result.pieces.get(goal.label, ()))
+    return pieces if len(pieces) == size and max(pieces) == value else (value,) * size
 
 
 def _pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.problem import Evaluation, Goal, Problem
+from tpm_design.runs.marks import front_marks
 from tpm_design.runs.search import Entry
 from tpm_design.units import Units, si_unit, unit_for
 
@@ -117,8 +118,9 @@ def metric_cells(evaluation: Evaluation, columns: Sequence[Column], units: Units
 
 def designs_table(problem: Problem, units: Units, result: Sequence[Entry], *, ranked: bool = True) -> str:
     """``designs.csv``: one row per entry, each metric followed by its numeric error. ``ranked``: the entries
-    are optima, best first, and a first column counts them. No times, paths or run ids, so that equal
-    searches give equal files."""
+    are optima, best first, and a first column counts them; where they are a front of several objectives, a
+    second one marks its knee and extremes. No times, paths or run ids, so that equal searches give equal
+    files."""
     parameters, metrics = parameter_columns(problem, units), metric_columns(problem, units)
     notes = note_columns(problem)
     headings = ["id", "status", *(column.heading for column in parameters)]
@@ -134,6 +136,9 @@ def designs_table(problem: Problem, units: Units, result: Sequence[Entry], *, ra
             row += [cell, number(units.from_si(error, column.unit)) if cell else ""]
         row += [evaluation.notes.get(name, "") for name in notes]
         rows.append([*row, number(evaluation.violation)])
+    if ranked and len(problem.objectives) > 1:
+        marks = ["mark", *front_marks(problem, result)]
+        rows = [[mark, *row] for mark, row in zip(marks, rows, strict=True)]
     if ranked:
         rows = [["rank" if place == 0 else str(place), *row] for place, row in enumerate(rows)]
     return "".join(csv_line(row) for row in rows)

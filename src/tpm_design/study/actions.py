@@ -18,8 +18,10 @@ from tpm_design.problem import Design, Evaluation, evaluate
 from tpm_design.runs.executors import Executor
 from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run, text_hash
 from tpm_design.runs.lock import sole_writer
+from tpm_design.runs.marks import front_marks
 from tpm_design.runs.optimality import gap_of, with_bound
 from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, search
+from tpm_design.runs.proved_knee import with_proved_knee
 from tpm_design.runs.replay import answers_in
 from tpm_design.runs.rounds import Proving, search_certified
 from tpm_design.runs.search import Entry, answer_key
@@ -36,7 +38,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Run:
-    """A finished search. ``best``: the best feasible evaluation, else the one of least violation.
+    """A finished search. ``best``: the best feasible evaluation, of several objectives the knee of the front,
+    else the one of least violation. ``front``: of several objectives, best first by the first one.
     ``evaluations``: the table of evaluations.csv, in the study's units. ``folder``: None if not written.
     ``verdict``: on the best design, None where the study asks for none or nothing feasible was found."""
 
@@ -46,6 +49,7 @@ class Run:
     result: SearchResult
     folder: Path | None
     verdict: Verdict | None = None
+    front: tuple[Evaluation, ...] = ()
 
 
 def evaluate_design(study: Study, values: Mapping[str, float | str]) -> Evaluation:
@@ -102,7 +106,8 @@ def optimize_study(
             result = _written(study, plan, workers, executor, watch, folder, stored)
     best = None if result.best is None else result.best.evaluation
     table = evaluations_frame(study, result.entries)
-    return Run(best, table, result.status, result, folder, result.verdict)
+    front = tuple(entry.evaluation for entry in result.front)
+    return Run(best, table, result.status, result, folder, result.verdict, front)
 
 
 def _searched(
@@ -116,8 +121,12 @@ def _searched(
     problem = study.problem
     if study.certification is None:
         result = search(problem, plan, workers=workers, record=record, stored=stored, executor=executor)
+        return with_bound(problem, plan, result)
+    proving = Proving(study.certification.tolerance, study.certification.boxes)
+    if len(problem.objectives) > 1:
+        result = search(problem, plan, workers=workers, record=record, stored=stored, executor=executor)
+        result = with_proved_knee(problem, proving, result, workers=workers)
     else:
-        proving = Proving(study.certification.tolerance, study.certification.boxes)
         result = search_certified(
             problem, plan, proving, workers=workers, record=record, stored=stored, executor=executor
         )
@@ -163,6 +172,7 @@ def _written(
             "budget": plan.budget,
             "workers": workers if executor is None else executor.workers,
             "remarks": list(result.remarks),
+            **_front_data(study, result),
             **_bound_data(result),
             **({} if study.certification is None else _rounds_data(result)),
             "study_hash": study.study_hash,
@@ -171,8 +181,16 @@ def _written(
             **({} if stored is None else {"resumed_after": len(stored)}),
             "seconds": round(time.perf_counter() - began, 3),
         }
-        writer.finish(result.entries, result.optima, summary)
+        writer.finish(result.entries, result.front or result.optima, summary)
     return result
+
+
+def _front_data(study: Study, result: SearchResult) -> dict[str, Any]:
+    """For run.json: ids of the front's designs, and what each is marked with, if anything."""
+    if len(study.problem.objectives) == 1:
+        return {}
+    marks = front_marks(study.problem, result.front)
+    return {"front": {str(e.number): mark for e, mark in zip(result.front, marks, strict=True)}}
 
 
 def _bound_data(result: SearchResult) -> dict[str, Any]:

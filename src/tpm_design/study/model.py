@@ -364,7 +364,7 @@ class RecordModel(Entry):
 class OptimizerModel(Strict):
     """``optimizer:``"""
 
-    method: Text = "scipy.differential_evolution"
+    method: Text | None = None
     budget: Annotated[Whole, Field(ge=1, le=10**9)] = 2000
     seed: Annotated[Whole, Field(ge=0, le=2**32 - 1)] = 1
     polish: Text | None = None

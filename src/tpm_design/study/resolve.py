@@ -9,6 +9,7 @@ from pathlib import Path
 from tpm_design.design_space import spans
 from tpm_design.errors import did_you_mean
 from tpm_design.mechanisms.base import MechanismKind
+from tpm_design.optimizers import default_method
 from tpm_design.optimizers.base import Optimizer
 from tpm_design.problem import Accuracy, Problem, Variable
 from tpm_design.study.document import Document, read_document
@@ -73,7 +74,7 @@ def resolve(document: Document, model: StudyModel, known: Registries, *, allow_c
     ties = read_ties(model.mechanism, kind, parameters, faults)
     limits = read_limits(model.mechanism.limits, kind, units, faults)
     certification = _certification(model.certify, kind, units, faults)
-    optimizer = _optimizer(model.optimizer, known.optimizers, faults)
+    optimizer = _optimizer(model.optimizer, len(model.objectives), known.optimizers, faults)
     faults.raise_if_any()  # the modes and the centre's bounds follow from the parameters
 
     ranges = spans(parameters)
@@ -136,7 +137,7 @@ def resolve(document: Document, model: StudyModel, known: Registries, *, allow_c
         "region": written_region,
         "objectives": [written for _, written in objectives],
         "constraints": [written for _, written in constraints],
-        "optimizer": model.optimizer,
+        "optimizer": model.optimizer.model_copy(update={"method": optimizer.method}),
         "accuracy": model.accuracy,
         "certify": model.certify,
         "sweep": written_sweep,
@@ -228,13 +229,14 @@ def _tolerance(model: CertifyModel, kind: MechanismKind, units: Units, faults: F
     return found
 
 
-def _optimizer(model: OptimizerModel, methods: Mapping[str, Optimizer], faults: Faults) -> OptimizerSettings:
-    """The method and the local method that polishes its result."""
-    if model.method not in methods:
+def _optimizer(
+    model: OptimizerModel, objectives: int, methods: Mapping[str, Optimizer], faults: Faults
+) -> OptimizerSettings:
+    """The method, by default one for so many objectives, and the local method that polishes its result."""
+    chosen = default_method(objectives) if model.method is None else model.method
+    if chosen not in methods:
         faults.add(
-            ("optimizer", "method"),
-            f"there is no method {shown(model.method)}",
-            did_you_mean(model.method, methods),
+            ("optimizer", "method"), f"there is no method {shown(chosen)}", did_you_mean(chosen, methods)
         )
     local = [name for name, method in methods.items() if not method.abilities.whole_space]
     if model.polish is not None and model.polish not in local:
@@ -242,4 +244,4 @@ def _optimizer(model: OptimizerModel, methods: Mapping[str, Optimizer], faults: 
         faults.add(
             ("optimizer", "polish"), f"{shown(model.polish)} {what}", did_you_mean(model.polish, local)
         )
-    return OptimizerSettings(model.method, model.budget, model.seed, model.polish)
+    return OptimizerSettings(chosen, model.budget, model.seed, model.polish)

@@ -33,7 +33,11 @@ def study_schema() -> Schema:
     for name in ("ObjectiveModel", "ConstraintModel", "RecordModel"):
         _metrics(definitions[name], known)
     method = definitions["OptimizerModel"]["properties"]
-    method["method"]["enum"] = sorted(known.optimizers)
+    method["method"] = {
+        "description": "by default scipy.differential_evolution, pymoo.nsga2 for several objectives",
+        "enum": [*sorted(known.optimizers), None],
+        "default": None,
+    }
     local = [name for name, optimizer in known.optimizers.items() if not optimizer.abilities.whole_space]
     method["polish"] = {"enum": [*sorted(local), None], "default": None}
     _architectures(schema)

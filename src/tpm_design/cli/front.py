@@ -1,0 +1,48 @@
+"""How a front is shown: a table for people, or data for --json."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from tpm_design.cli.results import evaluation_data
+from tpm_design.cli.text import table
+from tpm_design.problem import Problem
+from tpm_design.runs.marks import front_marks
+from tpm_design.runs.search import Entry
+from tpm_design.runs.tables import goal_unit, parameter_columns
+from tpm_design.units import Units
+
+MOST_ROWS = 15
+"""Longer fronts are shown thinned out, marked designs always; designs.csv holds them whole."""
+
+
+def front_text(problem: Problem, units: Units, front: Sequence[Entry]) -> str:
+    """Objectives and free quantities along the front, best first by the first objective."""
+    marks = front_marks(problem, front)
+    step = -(-len(front) // MOST_ROWS)
+    free = {variable.name for variable in problem.variables}
+    columns = [column for column in parameter_columns(problem, units) if column.name in free]
+    rows = []
+    for place, (entry, mark) in enumerate(zip(front, marks, strict=True)):
+        if place % step and not mark:
+            continue
+        row = [str(place + 1), mark]
+        for goal in problem.objectives:
+            row.append(units.written(entry.evaluation.metrics[goal.label], goal_unit(problem, goal)))
+        for column in columns:
+            value = entry.evaluation.design[column.name]
+            row.append(value if isinstance(value, str) else units.written(value, column.unit))
+        rows.append(row)
+    headings = ["rank", "mark", *(goal.label for goal in problem.objectives), *(c.name for c in columns)]
+    shown = f"\n{len(rows)} of {len(front)} designs; designs.csv holds all." if step > 1 else ""
+    return table(headings, rows) + shown
+
+
+def front_data(problem: Problem, units: Units, front: Sequence[Entry]) -> list[dict[str, Any]]:
+    """Every design of a front, in order."""
+    marks = front_marks(problem, front)
+    return [
+        {"id": entry.number, "mark": mark, **evaluation_data(problem, units, entry.evaluation)}
+        for entry, mark in zip(front, marks, strict=True)
+    ]
