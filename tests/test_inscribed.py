@@ -81,6 +81,17 @@ def test_three_cylinders(name: str) -> None:
     assert halves(found) == pytest.approx([1.2 * value for value in IN_CYLINDERS[name]], rel=PRECISE)
 
 
+def test_the_stroke_of_the_carriages_bounds_the_body() -> None:
+    """A carriage of an orthogonal 3-CRR moves as far as the platform does along its axis."""
+    limits = {"fold": False, "stroke": (-0.1, 0.3)}
+    built = MECHANISMS["crr"].build({"f": 0.5, "r": 0.5}, limits)
+    found = largest_body(built, built.mode_of({"elbows": "+++"}), "box")
+    assert halves(found) == pytest.approx([0.2] * 3, rel=PRECISE)
+    assert found is not None and found.centre == pytest.approx([0.1] * 3, rel=PRECISE)
+    # each face lies on a bound of its own
+    assert found.gap is not None and found.gap < PRECISE
+
+
 @pytest.mark.parametrize("name", ["box", "cylinder"])
 def test_no_body_holds_a_pose_at_which_a_limb_is_folded(name: str) -> None:
     found = largest_body(*three_cylinders(0.5, 0.5, fold=True), name)

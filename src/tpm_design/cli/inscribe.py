@@ -167,14 +167,17 @@ def _centre_text(body: InscribedBody, units: Units) -> str:
 
 
 def _verified(study: Study, found: InscribedBody, proof: ProvedBody | None) -> str:
-    known = found.gap is not None and found.gap < LARGEST_GAP
-    gap = (
-        f"The largest {found.form.name} between the planes that touch the region where this one does has "
-        f"{100.0 * max(found.gap or 0.0, 1e-8):.2g} % more volume at most: next to none at a local optimum."
-        if known
-        else f"How near it is to a local optimum is not known: the planes where it touches bound no "
-        f"{found.form.name}."
-    )
+    form = found.form.name
+    if found.gap is not None and found.gap < LARGEST_GAP:
+        gap = (
+            f"The largest {form} between the planes that touch the region where this one does is larger by "
+            f"{100.0 * max(found.gap, 1e-8):.2g} % of the volume: next to nothing at a local optimum."
+        )
+    else:
+        gap = (
+            f"How near it is to a local optimum is not known: the planes where it touches bound no {form} "
+            "of its size."
+        )
     if proof is None:
         return f"Sampled, not proved: the least margins were found by a search. --certify proves.\n{gap}"
     if not proof.proved:

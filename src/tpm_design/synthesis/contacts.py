@@ -17,7 +17,7 @@ from tpm_design.workspace.sampling import lattice
 FloatArray = NDArray[np.float64]
 
 # of each bound, the nearest ones
-MOST_OF_A_BOUND = 24
+MOST_SLOPED, MOST_BARE = 24, 6
 # of the body's size: what is deeper inside touches nothing soon
 DEEP = 0.3
 # rows of a Jacobian closer than this are one contact
@@ -25,6 +25,8 @@ ALIKE, ALIKE_WALLS = 1e-4, 1e-7
 # of the unit body, from its surface: what is deeper lies inside
 INSIDE = 1e-6
 BISECTIONS = 50
+# of the reach, in metres, for determinants too: gains of a polish that are rounding
+FLAT = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,21 +135,45 @@ def contacts(
         lowest = _local_minima(margins[number].reshape(grid.shape[:3]))
         lowest = lowest[np.argsort(margins[number][lowest], kind="stable")]
         lowest = lowest[_unlike(form, free, centre, sizes, (poses[lowest] - centre) / half, number)]
-        for n in lowest[:MOST_OF_A_BOUND]:
+        for n in lowest:
             (found,) = extremes_over_region(
                 free.mechanism.geometry, free.mode.signs, region, [index], poses[n : n + 1], spacing
             )
-            units.append((np.asarray(found.pose) - centre) / half)
+            # along a bound that is flat a polish leads anywhere
+            gained = margins[number, n] - float(free.margins(np.array([found.pose]))[number, 0])
+            pose = np.asarray(found.pose) if gained > FLAT * free.length else poses[n]
+            units.append((pose - centre) / half)
             bounds.append(number)
     unit, bound = np.array(units).reshape(-1, 3), np.array(bounds, dtype=np.int64)
     enclosed, walls = _walls(form, free, centre, sizes, unit, bound)
     unit, bound = unit[~enclosed], bound[~enclosed]
-    beside = aside * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
-    around = centre + half * (unit[:, None] + beside).reshape(-1, 3)
-    inside = np.array([nearest_pose(region, (x, y, z)) for x, y, z in around.tolist()]).reshape(-1, 3)
-    every = contacts_at(form, free, centre, sizes, (inside - centre) / half, np.repeat(bound, len(beside)))
+    unit, bound = _with_points_beside(form, free, centre, sizes, unit, bound, aside)
+    every = contacts_at(form, free, centre, sizes, unit, bound)
     near = every.chosen(every.distance <= DEEP * float(half.max()))
     return replace(near, walls=walls).distinct()
+
+
+def _with_points_beside(
+    form: BodyForm,
+    free: FreeSet,
+    centre: FloatArray,
+    sizes: FloatArray,
+    unit: FloatArray,
+    bound: NDArray[np.int64],
+    aside: float,
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Points of the unit body, and others beside each along the axes; where no slope shows that bounds meet,
+    between the axes too, since in a corner of a box three faces may each be on a bound of their own."""
+    region, half = form.region(centre, sizes), form.half(sizes)
+    slopes = free.slopes(centre + half * unit)[1][bound, np.arange(len(bound))]
+    bare = ~np.isfinite(slopes).all(axis=1)
+    ways = np.array([[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], dtype=np.float64)
+    few, more = (ways[np.abs(ways).sum(axis=1) <= count] for count in (1, 2))
+    around = [(unit[some][:, None] + aside * to).reshape(-1, 3) for some, to in ((~bare, few), (bare, more))]
+    bounds = [np.repeat(bound[some], len(to)) for some, to in ((~bare, few), (bare, more))]
+    poses = centre + half * np.vstack(around)
+    inside = np.array([nearest_pose(region, (x, y, z)) for x, y, z in poses.tolist()]).reshape(-1, 3)
+    return (inside - centre) / half, np.concatenate(bounds)
 
 
 def _walls(
@@ -186,8 +212,8 @@ def _walls(
 def _unlike(
     form: BodyForm, free: FreeSet, centre: FloatArray, sizes: FloatArray, unit: FloatArray, bound: int
 ) -> NDArray[np.int64]:
-    """Numbers of the points, in order, that are worth a polish: not deep, and no two alike. Those without
-    a slope all are."""
+    """Numbers of the points, given in order of their margins, that are worth a polish: not deep, and no two
+    alike; and some of those without a slope."""
     poses = centre + form.half(sizes) * unit
     values, slopes = (of_all[bound] for of_all in free.slopes(poses))
     steepness = np.linalg.norm(slopes, axis=1, keepdims=True)
@@ -196,10 +222,12 @@ def _unlike(
     rows = np.column_stack([normals, unit * normals, distance / float(form.half(sizes).max())])
     sloped = np.isfinite(rows).all(axis=1)
     _, first = np.unique(np.round(rows[sloped] / ALIKE), axis=0, return_index=True)
-    kept = ~sloped
-    kept[np.flatnonzero(sloped)[first]] = True
-    kept &= ~(rows[:, -1] > DEEP)
-    return np.flatnonzero(kept)
+    unlike = np.flatnonzero(sloped)[np.sort(first)]
+    bare = np.flatnonzero(~sloped)
+    # of a whole edge along which two bounds meet, the lowest and some all along it
+    spread = bare[np.linspace(0, bare.size - 1, min(bare.size, MOST_BARE)).astype(np.int64)]
+    bare = np.unique(np.append(bare[:MOST_BARE], spread))
+    return np.append(unlike[rows[unlike, -1] <= DEEP][:MOST_SLOPED], bare)
 
 
 def _local_minima(values: FloatArray) -> NDArray[np.int64]:

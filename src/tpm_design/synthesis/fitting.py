@@ -39,12 +39,26 @@ MOST_LOOKS = 5
 # of the half sizes, from a contact to where other bounds that meet there are looked for: far enough to give
 # them contacts of their own, and so near that their planes touch the body
 ASIDE, CLOSE_BY = 2e-3, 1e-5
+# of the size: contacts on the way to an optimum that are no farther from a bound there tell its planes, too
+BESIDE = 1e-4
+# of the reach: larger bodies between planes are not bounded by them
+LIMIT = 2.0
 
 
-def fitted(form: BodyForm, start: Grown) -> Grown | None:
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A body at a local optimum. ``gap``: by which share of its volume the largest body between the planes
+    that touch the free set at its contacts is larger, 0 at an optimum; None where they bound no body."""
+
+    body: Grown
+    gap: float | None
+
+
+def fitted(form: BodyForm, start: Grown) -> Fitted | None:
     """The body at a local optimum, all of it in the free set as far as its contacts tell; None where nothing
     of it is."""
-    best, known = start, None
+    best = start
+    known: Contacts | None = None
     for _ in range(MOST_LOOKS):
         found, known = _exchanged(form, best, known)
         if found is None:
@@ -53,10 +67,10 @@ def fitted(form: BodyForm, start: Grown) -> Grown | None:
         inside, seen, share = _shrunk(form, found, known, FINE)
         if inside is None:
             return None
-        if share >= 1.0 - CLOSE:
-            return inside
         best, known = inside, _nearest(form, inside, seen)
-    return best
+        if share >= 1.0 - CLOSE:
+            break
+    return Fitted(best, _gap(form, best, known))
 
 
 def _exchanged(form: BodyForm, start: Grown, known: Contacts | None) -> tuple[Grown | None, Contacts]:
@@ -210,17 +224,20 @@ def _solved(form: BodyForm, body: Grown, known: Contacts, stride: float) -> Grow
     return program.body_at(np.asarray(found.x)) if np.isfinite(found.x).all() else body
 
 
-def upper_volume(form: BodyForm, body: Grown) -> float | None:
-    """The volume (m³) of the largest body between the planes that touch the free set at this one's contacts:
-    its own at a local optimum. None where they do not bound it."""
-    near = contacts(form, body.free, body.centre, body.sizes, aside=CLOSE_BY, samples=FINE)
-    near = near.chosen(near.distance <= 4.0 * CLOSE_BY * float(form.half(body.sizes).max()))
-    half, planes = form.half(body.sizes), _planes(form, body, near)
+def _gap(form: BodyForm, body: Grown, known: Contacts | None) -> float | None:
+    """``Fitted.gap`` of a body, by what is known of its surroundings and a closer look."""
+    half = form.half(body.sizes)
+    size = float(half.max())
+    close = contacts(form, body.free, body.centre, body.sizes, aside=CLOSE_BY, samples=FINE)
+    near = close.chosen(close.distance <= 4.0 * CLOSE_BY * size)
+    if known is not None:
+        near = near.joined(known.chosen(known.distance <= BESIDE * size))
+    planes = _planes(form, body, near)
     # room of each contact's plane about the body's centre
     rooms = near.distance + np.einsum("kj,kj->k", near.normal, half * near.unit)
     normals = np.vstack([near.normal, planes.normals])
     offsets = np.append(rooms, planes.offsets - planes.normals @ body.centre)
-    found = largest_between(form.unit, form.spread, normals, offsets / body.free.length, 2.0)
-    if found is None or np.any(found.sizes > 1.99):
+    found = largest_between(form.unit, form.spread, normals, offsets / body.free.length, LIMIT)
+    if found is None or np.any(found.sizes > 0.99 * LIMIT):
         return None
-    return form.volume(body.free.length * found.sizes)
+    return max(0.0, form.volume(body.free.length * found.sizes) / form.volume(body.sizes) - 1.0)

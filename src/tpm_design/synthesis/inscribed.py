@@ -13,7 +13,7 @@ from tpm_design.errors import ParameterError, RefusedError
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.metrics.context import Context
 from tpm_design.synthesis.body_forms import BodyForm, Triple, body_form
-from tpm_design.synthesis.fitting import fitted, upper_volume
+from tpm_design.synthesis.fitting import Fitted, fitted
 from tpm_design.synthesis.free_set import FreeSet, seeds
 from tpm_design.synthesis.growth import Grown, grown
 from tpm_design.workspace.regions import Shape
@@ -135,9 +135,10 @@ def _worth_fitting(form: BodyForm, bodies: Sequence[Grown]) -> list[Grown]:
     return chosen[:MOST_FITTED]
 
 
-def _within(form: BodyForm, body: Grown) -> InscribedBody | None:
+def _within(form: BodyForm, fit: Fitted) -> InscribedBody | None:
     """The body shrunk by about the least share with which it passes the check, its lengths cut to round
     numbers."""
+    body = fit.body
     low = high = 0.0
     passed = _passed(form, body, high)
     for step in STEPS:
@@ -152,8 +153,8 @@ def _within(form: BodyForm, body: Grown) -> InscribedBody | None:
         smaller = _passed(form, body, middle)
         low, high, passed = (middle, high, passed) if smaller is None else (low, middle, smaller)
     (centre, sizes), margins = passed
-    upper = upper_volume(form, body)
-    gap = None if upper is None else max(0.0, upper / form.volume(sizes) - 1.0)
+    less = 1.0 - form.volume(sizes) / form.volume(body.sizes)
+    gap = None if fit.gap is None else fit.gap + less
     growths = _growths(form, Grown(body.free, centre, sizes))
     x, y, z = centre.tolist()
     return InscribedBody(form, body.free, (x, y, z), sizes, margins, growths, gap)
