@@ -15,6 +15,9 @@ from tpm_design.optimizers.watch import Watch
 SAMPLES = 16
 """Points of the first sample for each variable and one more, at least; further samples are as large."""
 
+KEPT = 0.25
+"""Share of a sample that is measured to the end: local searches begin at none of the others."""
+
 APART, CLOSER = 0.1, 0.7
 """Least distance of starts from each other and from optima, times the root of the dimension; the factor on it
 where a whole sample has nothing so far away."""
@@ -53,7 +56,9 @@ class Starts:
         if not self._samples:
             points = np.vstack([self._search.start, points])
         points = np.where(self._levels > 0, self._centred(points), points)
-        self._samples += places(points, self._search.evaluate(points))
+        found = self._search.screen(points, ceil(KEPT * len(points)))
+        aborted = found.aborted if found.aborted.size else np.zeros(len(points), dtype=np.bool_)
+        self._samples += [p for p, cut in zip(places(points, found), aborted, strict=True) if not cut]
 
     def next(self, optima: Sequence[FloatArray]) -> Place:
         """The next start, away from ``optima``: the search's own first."""
