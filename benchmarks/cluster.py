@@ -17,13 +17,13 @@ from subprocess import DEVNULL, Popen
 import psutil
 
 from row import Row
-from sweep import slow_points
 from tpm_design.problem import Evaluation, Problem, evaluate
 from tpm_design.runs.dask_workers import dask_workers
 from tpm_design.runs.executors import SWITCH_INTERVAL, Executor, Threads, in_order
 from tpm_design.runs.folder import RunWriter
 from tpm_design.runs.search import Entry
 from tpm_design.study import load_study
+from workers import slow_points
 
 STUDY = Path(__file__).resolve().parents[1] / "studies" / "01-uru-cube.yaml"
 COUNT, WORKERS, ROUNDS, TARGET = 1000, 2, 5, 1.05

@@ -17,7 +17,7 @@ NAMES = (
     "certified_volume",
     "certificate",
     "screening",
-    "sweep",
+    "workers",
     "cluster",
     "study",
 )

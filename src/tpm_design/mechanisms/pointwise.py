@@ -109,6 +109,16 @@ def centres_at(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     return equations.joint_centres(geometry, mode, x, y, z)
 
 
+@inner
+def rows_of(points):  # type: ignore[no-untyped-def]
+    """x, y, z (N,) of poses (N, 3), each contiguous."""
+    count = points.shape[0]
+    x, y, z = np.empty(count), np.empty(count), np.empty(count)
+    for n in range(count):
+        x[n], y[n], z[n] = points[n, 0], points[n, 1], points[n, 2]
+    return x, y, z
+
+
 def columns(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """x, y, z of an (N, 3) array, contiguous."""
     table = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 3).T)

@@ -101,18 +101,21 @@ def descend(
     radius: float,
     abandoned: Callable[[Place], bool] = never,
     fine: float = FINE,
+    steps: int = MOST_STEPS,
 ) -> Walk:
     """Walk downhill from ``start`` in the variables ``free`` (their numbers), the others held.
 
     ``radius``: of the first trust region; ``fine``: of the last. ``abandoned``: asked at every new place
-    whether to give up. Sources: R. Fletcher, Practical methods of optimization, 1987, 14.4 (exact penalty in
-    a trust region, correction of second order); M. J. D. Powell, 1978 (damped update of the curvature).
+    whether to give up. ``steps``: at most.
+
+    Sources: R. Fletcher, Practical methods of optimization, 1987, 14.4 (exact penalty in a trust region,
+    correction of second order); M. J. D. Powell, 1978 (damped update of the curvature).
     """
     if not len(free):
         return _standing(start)
     while True:
         try:
-            return (yield from _Descent(start, free, radius, fine).run(abandoned))
+            return (yield from _Descent(start, free, radius, fine).run(abandoned, steps))
         except _MorePieces as more:
             start = yield from looked_at(more.here.point)
 
@@ -135,11 +138,11 @@ class _Descent:
         self._failures, self._forgetting, self._harder = 0, FORGETTING, 1
         self._gradient, self._jacobian = np.zeros(len(free)), np.zeros((len(start.constraints), len(free)))
 
-    def run(self, abandoned: Callable[[Place], bool]) -> Walk:
+    def run(self, abandoned: Callable[[Place], bool], steps: int) -> Walk:
         measure = self._measure
         self._gradient, self._jacobian = yield from self._slopes(self._here)
         self._curvature *= measure.follow(self._here, self._gradient, self._jacobian)
-        for _ in range(MOST_STEPS):
+        for _ in range(steps):
             cuts = cuts_near(self._here, self._free, self._seen, measure, self._radius)
             program = self._program(cuts)
             shortfall = measure.shortfall(self._here)

@@ -3,6 +3,7 @@ objective, each solved by NLopt's COBYLA. Deterministic."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,7 +52,7 @@ def epsilon_constraint(watch: Watch, seed: int) -> str:
     known = _Known(watch)
     known.survey()
     # at a design that serves the region metrics over the region have all their pieces
-    _extreme(known, 0)
+    known.reach_feasible()
     known.see_pieces()
     first = _extreme(known, 0)
     second = _extreme(known, 1)
@@ -102,13 +103,11 @@ class _Task:
 
 
 def _extreme(known: _Known, objective: int) -> int:
-    """The least of one objective, then the least of the other one there. Raises Stalled."""
+    """The least of one objective, then the least of the other one there."""
     other, width = 1 - objective, known.range()
-    best = known.descend(_Task(objective, other, np.inf, width))
-    if not known.met(best):
-        raise Stalled("No design that meets the constraints was found near the initial one or in the survey.")
-    least = known.objectives(best)
-    return known.descend(_Task(other, objective, float(least[objective]), width))
+    best = known.descend(_Task(objective, other, np.inf, width), STEPS)
+    least = float(known.objectives(best)[objective])
+    return known.descend(_Task(other, objective, least, width), STEPS[1:2])
 
 
 class _Known:
@@ -178,9 +177,17 @@ class _Known:
         violation = violation + np.maximum(0.0, values[:, task.bounded] - task.bound)
         return int(np.lexsort((values[:, task.minimised], np.where(violation <= -MET, 0.0, violation)))[0])
 
-    def descend(self, task: _Task) -> int:
-        """The best point after descents from the best known one."""
+    def reach_feasible(self) -> None:
+        """Descend until a point meets the constraints. Raises Stalled where none does."""
+        task = _Task(0, 1, np.inf, self.range())
         for step in STEPS:
+            if self.met(self.descend(task, (step,))):
+                return
+        raise Stalled("No design that meets the constraints was found near the initial one or in the survey.")
+
+    def descend(self, task: _Task, steps: Sequence[float]) -> int:
+        """The best point after descents from the best known one."""
+        for step in steps:
             self._cobyla(task, self._points[self.best(task)], step)
         return self.best(task)
 

@@ -28,6 +28,8 @@ RADIUS = 0.2
 COARSE = 1e-4
 """Trust region at which such a search has come near enough to an optimum; the best ones are finished."""
 
+COARSE_STEPS = 60
+
 POLISH_RADII = (0.03, 0.003)
 """First trust regions of the local searches that begin again at the best optimum."""
 
@@ -195,7 +197,7 @@ class _Course:
         yield from self._arrived(landing, independent=False)
 
     def _descended(self, start: Place, radius: float) -> Generator[FloatArray, Outcomes, Landing]:
-        landing = yield from descend(start, self._free, radius, self._known, COARSE)
+        landing = yield from descend(start, self._free, radius, self._known, COARSE, COARSE_STEPS)
         if not len(self._free):
             landing = yield from descend_levels(landing, self._levels)
         return landing
@@ -206,7 +208,7 @@ class _Course:
         landing = best.landing
         for radius in POLISH_RADII if len(self._free) else ():
             further = yield from descend(landing.place, self._free, radius)
-            if further.place.improves(landing.place):
+            if not landing.place.improves(further.place):
                 landing = further
         best.landing, best.finished = landing, True
         self._tell()

@@ -17,8 +17,8 @@ from tpm_design.workspace.poses import aspect_code
 from tpm_design.workspace.rays import Segments, traced
 from tpm_design.workspace.region_geometry import BOX, CYLINDER, PlacedRegion
 
-# of the coarse field where a fine one is asked for alone
-LEAST_ORDER = 2
+# beside rays that are asked for alone
+NO_RAYS = RaySet(np.empty((0, 3)), np.empty(0), np.empty(0), np.empty((0, 2), np.int64))
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,9 @@ def _traced_and_joined(geometry, mode, sided, part_count, floor, origin, scale, 
     segments = traced(geometry, mode, sided, part_count, floor, origin, steps, limits)
     ray, start, end, code = segments
     component, volumes = _components(ray, start, end, code, neighbours, weights)
-    volumes *= abs(scale[0] * scale[1] * scale[2])
+    cell = abs(scale[0] * scale[1] * scale[2])
+    for number in range(volumes.size):
+        volumes[number] *= cell
     sides, middles = _longest(segments, component, volumes.size, origin, steps)
     return segments, component, volumes, sides, middles
 
@@ -163,17 +165,30 @@ def mode_fields(
 ) -> tuple[RayField, RayField]:
     """The whole workspace of the mode, by the square of each order of rays per square from the origin."""
     octants = mode_octants(mode)
-    fine, coarse = ray_set(octants, orders[0]), ray_set(octants, orders[1])
-    half = np.asarray(mechanism.reach_half_axes())
-    radius = float(half.max())
-    x, y, z = (half / radius).tolist()
-    limits = radius / fine.lengths, radius / coarse.lengths
-    return _fields(mechanism, mode, (fine, coarse), limits, sided=sided, floor=floor, scale=(x, y, z))
+    rays = ray_set(octants, orders[0]), ray_set(octants, orders[1])
+    return _from_origin(mechanism, mode, rays, sided=sided, floor=floor)
 
 
 def mode_field(mechanism: Mechanism, mode: Mode, *, order: int, sided: bool, floor: float = 0.0) -> RayField:
-    """As ``mode_fields``, the field of one order alone."""
-    return mode_fields(mechanism, mode, orders=(order, LEAST_ORDER), sided=sided, floor=floor)[0]
+    """As ``mode_fields``, of one order."""
+    rays = ray_set(mode_octants(mode), order), NO_RAYS
+    return _from_origin(mechanism, mode, rays, sided=sided, floor=floor)[0]
+
+
+def _from_origin(
+    mechanism: Mechanism, mode: Mode, rays: tuple[RaySet, RaySet], *, sided: bool, floor: float
+) -> tuple[RayField, RayField]:
+    half = np.asarray(mechanism.reach_half_axes())
+    radius = float(half.max())
+    x, y, z = (half / radius).tolist()
+    limits = radius / rays[0].lengths, radius / rays[1].lengths
+    return _fields(mechanism, mode, rays, limits, sided=sided, floor=floor, scale=(x, y, z))
+
+
+def reach_parts(mechanism: Mechanism, mode: Mode, rays: RaySet) -> Segments:
+    """The parts of rays from the origin that are within reach in the mode."""
+    limits = mechanism.reach_radius() / rays.lengths, np.empty(0)
+    return _fields(mechanism, mode, (rays, NO_RAYS), limits, sided=False, scale=(1.0, 1.0, 1.0))[0].segments
 
 
 def ball_field(

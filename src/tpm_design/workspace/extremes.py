@@ -78,46 +78,53 @@ def _best_of_eighths(region, points, values, stride):  # type: ignore[no-untyped
 
 
 @inner
-def _polished(geometry, mode, region, index, points, values, chosen, step, smallest):  # type: ignore[no-untyped-def]
-    """(value, decrease by the smallest steps, x, y, z) (K, 5) from each chosen pose; rows of +inf where
-    it is −1."""
-    out = np.full((chosen.size, 5), math.inf)
-    for k in range(chosen.size):
-        n = chosen[k]
-        if n >= 0:
-            start = (points[n, 0], points[n, 1], points[n, 2])
-            value, gain, x, y, z = _polish(geometry, mode, region, index, start, values[n], step, smallest)
-            out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = value, gain, x, y, z
-    return out
+def _polished(geometry, mode, region, index, points, values, spacing):  # type: ignore[no-untyped-def]
+    """As ``_least``, of a solid region: polished from the best pose of each eighth, and from the best of
+    every second pose alone where that is another one."""
+    pieces = np.full(EIGHTHS, math.inf)
+    before = np.full(EIGHTHS, -1, np.int64)
+    value, gain, pose = math.inf, 0.0, (points[0, 0], points[0, 1], points[0, 2])
+    halved = math.inf
+    # a loop, since for each literal stride everything would be compiled by itself
+    for stride in range(1, 3):
+        chosen = _best_of_eighths(region, points, values, stride)
+        for eighth in range(EIGHTHS):
+            n = chosen[eighth]
+            if stride == 2 and n == before[eighth]:
+                halved = min(halved, pieces[eighth])
+            elif n >= 0:
+                start = (points[n, 0], points[n, 1], points[n, 2])
+                found, last, x, y, z = _polish(
+                    geometry, mode, region, index, start, values[n], 0.5 * spacing, FINEST_STEP * spacing
+                )
+                if found < value:
+                    value, gain, pose = found, last, (x, y, z)
+                if stride == 1:
+                    pieces[eighth] = found
+                else:
+                    halved = min(halved, found)
+            before[eighth] = n
+    least = 0
+    for eighth in range(EIGHTHS):
+        if not math.isfinite(pieces[eighth]):
+            pieces[eighth] = value
+        if pieces[eighth] < pieces[least]:
+            least = eighth
+    pieces[least] = value
+    return value, halved - value + gain, pose, pieces
 
 
 @inner
 def _least(geometry, mode, region, index, points, spacing):  # type: ignore[no-untyped-def]
     """Value, error, pose and pieces (8,) of ``Extreme``, the index's sign still on them."""
     values = values_at(geometry, mode, index, points)
-    if region.form == POINTS:
-        n = values.argmin()
-        value, error, pose = values[n], 0.0, (points[n, 0], points[n, 1], points[n, 2])
-        pieces = np.full(EIGHTHS, value)
-    else:
-        # each eighth's best pose, then the best of every second pose alone where that is another one
-        chosen = np.empty(2 * EIGHTHS, np.int64)
-        chosen[:EIGHTHS] = _best_of_eighths(region, points, values, 1)
-        chosen[EIGHTHS:] = _best_of_eighths(region, points, values, 2)
-        halved = np.empty(EIGHTHS, np.int64)
-        for eighth in range(EIGHTHS):
-            halved[eighth] = eighth + EIGHTHS
-            if chosen[eighth + EIGHTHS] == chosen[eighth]:
-                halved[eighth] = eighth
-                chosen[eighth + EIGHTHS] = -1
-        step, smallest = 0.5 * spacing, FINEST_STEP * spacing
-        found = _polished(geometry, mode, region, index, points, values, chosen, step, smallest)
-        best = found[:, 0].argmin()
-        value, pose = found[best, 0], (found[best, 2], found[best, 3], found[best, 4])
-        error = found[halved, 0].min() - value + found[best, 1]
-        pieces = np.where(np.isfinite(found[:EIGHTHS, 0]), found[:EIGHTHS, 0], value)
-        pieces[pieces.argmin()] = value
-    return value, error, pose, pieces
+    if region.form != POINTS:
+        return _polished(geometry, mode, region, index, points, values, spacing)
+    n = 0
+    for other in range(values.size):
+        if values[other] < values[n]:
+            n = other
+    return values[n], 0.0, (points[n, 0], points[n, 1], points[n, 2]), np.full(EIGHTHS, values[n])
 
 
 @kernel

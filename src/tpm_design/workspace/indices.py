@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms import equations
-from tpm_design.mechanisms.pointwise import frobenius_row, least_margin
+from tpm_design.mechanisms.pointwise import frobenius_row, least_margin, rows_of
 from tpm_design.mechanisms.velocity import (
     inverse_condition_2,
     inverse_condition_frobenius,
@@ -155,7 +155,7 @@ def values_at(geometry, mode, index, points):  # type: ignore[no-untyped-def]
     out = np.empty(points.shape[0])
     if index.quantity == CONDITION_FROBENIUS:
         # vectorised
-        x, y, z = points[:, 0].copy(), points[:, 1].copy(), points[:, 2].copy()
+        x, y, z = rows_of(points)
         frobenius_row(geometry, mode, index.motor, x, y, z, out)
         for n in range(out.size):
             out[n] = index.sign * (out[n] if out[n] == out[n] else 0.0)

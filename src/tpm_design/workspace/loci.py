@@ -451,42 +451,55 @@ def _lattice_crossings(values, grid):  # type: ignore[no-untyped-def]
 def _starts(inside, feeler_points, feeler_normals, ways, known):  # type: ignore[no-untyped-def]
     """Poses (N, 3) near the locus: on the lattice, along feelers, known from elsewhere."""
     starts = np.empty((inside.shape[0] + ways.size + known.shape[0], 3))
-    count = inside.shape[0]
-    starts[:count] = inside
+    count = 0
+    for n in range(inside.shape[0]):
+        for c in range(3):
+            starts[count, c] = inside[n, c]
+        count += 1
     for n in range(ways.size):
-        if math.isfinite(ways[n]):
+        if ways[n] < math.inf:
             for c in range(3):
                 starts[count, c] = feeler_points[n, c] + ways[n] * feeler_normals[n, c]
             count += 1
-    starts[count : count + known.shape[0]] = known
-    return starts[: count + known.shape[0]]
+    for n in range(known.shape[0]):
+        for c in range(3):
+            starts[count, c] = known[n, c]
+        count += 1
+    return starts[:count]
 
 
 @kernel
 def _nearest_locus(  # type: ignore[no-untyped-def]
     geometry, mode, region, part, determinants, grid, feeler_points, feeler_normals, known, spacing, limit
 ):
-    """As ``locus_distance``: (fine, coarse) least distance and its pose from all starts and from half."""
+    """As ``locus_distance``: least distance and its pose (2, 4) from all starts and from half of them."""
     inside = _lattice_crossings(determinants[part], grid)
     if known.shape[0] > 0:
         # what lies beyond a known point of the locus is not the nearest
-        limit = min(limit, max(0.0, _signed_distances(region, known).min()) + spacing)
-    ways = _march(
-        geometry,
-        mode,
-        determinants.shape[0],
-        part,
-        feeler_points,
-        feeler_normals,
-        0.5 * spacing,
-        limit,
-    )
+        nearest_known = math.inf
+        for distance in _signed_distances(region, known):
+            nearest_known = min(nearest_known, distance)
+        limit = min(limit, max(0.0, nearest_known) + spacing)
+    count = determinants.shape[0]
+    ways = _march(geometry, mode, count, part, feeler_points, feeler_normals, 0.5 * spacing, limit)
     starts = _starts(inside, feeler_points, feeler_normals, ways, known)
     distances = _signed_distances(region, starts)
-    step, smallest = 0.5 * spacing, FINEST_STEP * spacing
-    fine = _best_slide(geometry, mode, region, part, starts, distances, 1, step, smallest)
-    coarse = _best_slide(geometry, mode, region, part, starts, distances, 2, step, smallest)
-    return fine, coarse
+    found = np.empty((2, 4))
+    # a loop, since for each literal stride everything would be compiled by itself
+    for k in range(2):
+        best, x, y, z = _best_slide(
+            geometry,
+            mode,
+            region,
+            part,
+            starts,
+            distances,
+            k + 1,
+            0.5 * spacing,
+            FINEST_STEP * spacing,
+        )
+        found[k, 0], found[k, 1], found[k, 2], found[k, 3] = best, x, y, z
+    return found
 
 
 def locus_distance(
@@ -521,10 +534,10 @@ def locus_distance(
         known,
         spacing,
         limit,
-    )
+    ).tolist()
     best = min(fine, coarse)
     if not best[0] < math.inf:
         return LocusDistance(math.inf, 0.0, None)
     both = max(fine[0], coarse[0]) < math.inf
     missed = abs(fine[0] - coarse[0]) if both else abs(best[0])
-    return LocusDistance(best[0], missed + ERROR_FLOOR * spacing, best[1:])
+    return LocusDistance(best[0], missed + ERROR_FLOOR * spacing, (best[1], best[2], best[3]))

@@ -234,12 +234,28 @@ def _cut(geometry, mode, sided, part_count, floor, origin, steps, segments, shap
 
 @inner
 def traced(geometry, mode, sided, part_count, floor, origin, steps, limits):  # type: ignore[no-untyped-def]
-    """Segments (ray, start, end, code) of each ray in order along it; of rays that need not be cut at
-    singularities every code is 1. Arguments as of ``trace``, ``steps`` (N, 3): scale · direction."""
-    whole = np.arange(limits.size), np.zeros(limits.size), limits
-    # code 2 is within reach, code 1 outside
-    ray, start, end, code = _cut(geometry, mode, False, 1, 0.0, origin, steps, whole, REACH_SAMPLES, 2)
+    """Segments (ray, start, end, code) of each ray in order along it, ``steps`` (N, 3) a unit of its
+    parameter, ``limits`` (N,) where it ends. ``sided``: cut where a determinant changes side or falls to
+    ``floor``; otherwise reach alone, and every code is 1.
+    """
+    ray, start, end = np.arange(limits.size), np.zeros(limits.size), limits
+    code = np.empty(0, np.int64)
+    for cut in range(2 if sided else 1):
+        at_sides = cut == 1
+        ray, start, end, code = _cut(
+            geometry,
+            mode,
+            at_sides,
+            part_count if at_sides else 1,
+            floor if at_sides else 0.0,
+            origin,
+            steps,
+            (ray, start, end),
+            SIDE_SAMPLES if at_sides else REACH_SAMPLES,
+            # of reach, code 2 is inside, code 1 outside
+            1 if at_sides else 2,
+        )
     if not sided:
-        code[:] = 1
-        return ray, start, end, code
-    return _cut(geometry, mode, True, part_count, floor, origin, steps, (ray, start, end), SIDE_SAMPLES, 1)
+        for n in range(code.size):
+            code[n] = 1
+    return ray, start, end, code

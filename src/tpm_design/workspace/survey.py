@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
-from tpm_design.mechanisms.pointwise import singularity_row
-from tpm_design.workspace.aspects import mode_octants
-from tpm_design.workspace.directions import Octant
+from tpm_design.mechanisms.pointwise import rows_of, singularity_row
+from tpm_design.workspace.aspects import mode_octants, reach_parts
+from tpm_design.workspace.directions import Octant, RaySet
 from tpm_design.workspace.indices import determinant_at
-from tpm_design.workspace.rays import traced
 
 NEAREST_PLANE = 1e-7
 ALONG = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 13))
@@ -36,18 +35,10 @@ class Survey:
     determinants: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class _RayGrids:
-    """``directions`` (N, 3), ``lengths`` (N,) their norms, ``neighbours`` (M, 2): rays next to each other."""
-
-    directions: NDArray[np.float64]
-    lengths: NDArray[np.float64]
-    neighbours: NDArray[np.int64]
-
-
 @lru_cache(maxsize=16)
-def _ray_grids(octants: tuple[Octant, ...], order: int) -> _RayGrids:
-    """``order``² rays in each of the three squares of an octant, edges included."""
+def _ray_grids(octants: tuple[Octant, ...], order: int) -> RaySet:
+    """``order``² rays in each of the three squares of an octant, edges included; nothing is integrated along
+    them."""
     u = np.maximum(NEAREST_PLANE, np.linspace(0.0, 1.0, order) ** 2)
     square = np.stack([np.ones((order, order)), *np.meshgrid(u, u, indexing="ij")], axis=-1).reshape(-1, 3)
     grid = np.arange(order * order).reshape(order, order)
@@ -60,7 +51,8 @@ def _ray_grids(octants: tuple[Octant, ...], order: int) -> _RayGrids:
     squares = [np.roll(square, axis, axis=1) * octant for octant in octants for axis in range(3)]
     neighbours = [pairs + number * order * order for number in range(len(squares))]
     directions = np.vstack(squares)
-    return _RayGrids(directions, np.linalg.norm(directions, axis=1), np.vstack(neighbours))
+    lengths = np.linalg.norm(directions, axis=1)
+    return RaySet(directions, lengths, np.zeros(len(directions)), np.vstack(neighbours))
 
 
 @inner
@@ -89,35 +81,40 @@ def _part_pairs(rays, neighbours, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _surveyed(geometry, mode, part_count, directions, limits, neighbours):  # type: ignore[no-untyped-def]
-    """Poses, pairs and determinants of ``Survey``."""
-    rays, start, end, _ = traced(geometry, mode, False, part_count, 0.0, (0.0, 0.0, 0.0), directions, limits)
-    poses = np.empty((rays.size, ALONG.size, 3))
+def _surveyed(geometry, mode, part_count, directions, neighbours, rays, start, end):  # type: ignore[no-untyped-def]
+    """Poses (S · K, 3), pairs and determinants (D, S · K) of ``Survey``."""
+    poses = np.empty((rays.size * ALONG.size, 3))
     for s in range(rays.size):
         for k in range(ALONG.size):
             t = start[s] + (end[s] - start[s]) * ALONG[k]
             for axis in range(3):
-                poses[s, k, axis] = t * directions[rays[s], axis]
-    table = poses.reshape(rays.size * ALONG.size, 3)
-    determinants = np.empty((part_count, table.shape[0]))
-    x, y, z = table[:, 0].copy(), table[:, 1].copy(), table[:, 2].copy()
+                poses[s * ALONG.size + k, axis] = t * directions[rays[s], axis]
+    determinants = np.empty((part_count, poses.shape[0]))
+    x, y, z = rows_of(poses)
     singularity_row(geometry, mode, x, y, z, determinants)
     for part in range(part_count):
-        for n in range(table.shape[0]):
+        for n in range(poses.shape[0]):
             if math.isnan(determinants[part, n]):
                 determinants[part, n] = 0.0
-    pairs = _part_pairs(rays, neighbours, directions.shape[0])
-    return poses, pairs, determinants.reshape(part_count, rays.size, ALONG.size)
+    return poses, _part_pairs(rays, neighbours, directions.shape[0]), determinants
 
 
 def survey(mechanism: Mechanism, mode: Mode, *, order: int) -> Survey:
     """The mode's workspace on ``order``² rays per square of an octant."""
     grids = _ray_grids(mode_octants(mode), order)
-    limits = mechanism.reach_radius() / grids.lengths
+    parts = reach_parts(mechanism, mode, grids)
     count = len(mechanism.kind.determinants)
-    return Survey(
-        *_surveyed(mechanism.geometry, mode.signs, count, grids.directions, limits, grids.neighbours)
+    poses, pairs, determinants = _surveyed(
+        mechanism.geometry,
+        mode.signs,
+        count,
+        grids.directions,
+        grids.neighbours,
+        parts.ray,
+        parts.start,
+        parts.end,
     )
+    return Survey(poses.reshape(-1, ALONG.size, 3), pairs, determinants.reshape(count, -1, ALONG.size))
 
 
 @inner
