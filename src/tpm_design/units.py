@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 Length = Literal["mm", "cm", "m", "in"]
@@ -37,6 +38,7 @@ def unit_for(unit: str, actuator_unit: str) -> str:
     return ((turning if actuator_unit == "rad" else sliding) or choices)[0]
 
 
+@cache
 def _powers(unit: str) -> tuple[int, int]:
     """Powers of metre and radian in a unit: ``m³`` → (3, 0), ``m/rad`` → (1, −1), ``-`` → (0, 0)."""
     if unit in {"-", "–", "1", ""}:

@@ -8,7 +8,7 @@ from designs import SHAPES, into, reachable_context, throughout
 
 from tpm_design.metrics.context import Context
 from tpm_design.workspace import indices
-from tpm_design.workspace.extremes import least_over_region
+from tpm_design.workspace.extremes import extremes_over_region
 from tpm_design.workspace.indices import Index, index_values
 from tpm_design.workspace.region_geometry import place
 from tpm_design.workspace.regions import Points
@@ -86,6 +86,7 @@ def test_extremes_over_points() -> None:
     points = np.array(offsets) + context.placed.centre
     for index in INDICES.values():
         values = index_values(context.mechanism.geometry, context.mode.signs, index, points)
-        found = least_over_region(context.mechanism.geometry, context.mode.signs, region, index, points, 0.01)
+        geometry, signs = context.mechanism.geometry, context.mode.signs
+        (found,) = extremes_over_region(geometry, signs, region, [index], points, 0.01)
         assert found.value == index.sign * values.min()
         assert found.error <= 1e-10 * abs(found.value)

@@ -13,6 +13,7 @@ from tpm_design.mechanisms import mechanism
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.metrics import METRICS
 from tpm_design.metrics.context import Context
+from tpm_design.workspace.aspects import RayField, locate, located, mode_field
 from tpm_design.workspace.volume import VolumeKind, volume_at, workspace_volume
 
 R1 = {"db": 0.3, "dp": 0.3, "f": 1.0, "r": 1.0, "k": 1.0}
@@ -186,6 +187,45 @@ def test_home_chooses_the_aspect() -> None:
         found = volume(tuple(poses[code == other][0]))
         assert 0.0 < found <= 1.2 * counts[other] * cell
     assert volume((1.8, 1.8, 1.8)) == 0.0
+
+
+def middles(field: RayField) -> np.ndarray:
+    """The middle (S, 3) of every segment."""
+    parts = field.segments
+    along = 0.5 * (parts.start + parts.end)[:, None]
+    return np.asarray(
+        np.array(field.origin) + along * np.array(field.scale) * field.rays.directions[parts.ray]
+    )
+
+
+def test_segments_lie_in_their_own_component() -> None:
+    """All at once and one by one; by a coarser field the sides, at least, are told apart."""
+    for parameters in (R3, UNEQUAL):
+        built, mode = machine(parameters)
+        field = mode_field(built, mode, order=8, sided=True)
+        poses = middles(field)
+        found = located(built, mode, field, poses)
+        np.testing.assert_array_equal(found, field.component)
+        assert [locate(built, mode, field, tuple(pose)) for pose in poses] == found.tolist()
+        other = mode_field(built, mode, order=6, sided=True)
+        by_other = located(built, mode, other, poses)
+        met = by_other >= 0
+        assert met.mean() > 0.95
+        np.testing.assert_array_equal(other.sides[by_other[met]], field.segments.code[met])
+        beyond = np.array([[2.0 * built.reach_radius()] * 3, poses[0], [-0.1, 0.1, 0.1]])
+        assert located(built, mode, field, beyond).tolist() == [-1, found[0], -1]
+
+
+def test_sides_and_middles_of_components() -> None:
+    for parameters in (R3, UNEQUAL):
+        field = mode_field(*machine(parameters), order=8, sided=True)
+        assert len(field.sides) == len(field.middles) == len(field.volumes) > 1
+        lengths, every = field.segments.end - field.segments.start, middles(field)
+        for number in range(len(field.sides)):
+            members = np.flatnonzero(field.component == number)
+            longest = members[np.argmax(lengths[members])]
+            assert set(field.segments.code[members].tolist()) == {field.sides[number]}
+            np.testing.assert_allclose(field.middles[number], every[longest], rtol=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from tpm_design.arithmetic import kernel_cache  # noqa: F401  (before Numba)
 
 # isort: split
-from tpm_design.arithmetic.compilation import FAST_MATH, fast_kernel, inlined, inner, kernel
+from tpm_design.arithmetic.compilation import FAST_MATH, fast_kernel, inlined, inner, kernel, short_kernel
 from tpm_design.arithmetic.dual import Dual, variables
 from tpm_design.arithmetic.formula import derived, formula
 from tpm_design.arithmetic.functions import (
@@ -40,6 +40,7 @@ __all__ = [
     "magnitude",
     "pos",
     "root",
+    "short_kernel",
     "sine",
     "sqr",
     "variables",

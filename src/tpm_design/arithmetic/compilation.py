@@ -67,6 +67,12 @@ def kernel(function: Function) -> Any:
     return _kept(njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function))
 
 
+def short_kernel(function: Function) -> Any:
+    """As ``kernel``, for what takes some microseconds: it keeps the interpreter's lock, which another thread
+    would else take meanwhile, and keep for longer."""
+    return _kept(njit(cache=True, error_model="numpy", no_cfunc_wrapper=True)(function))
+
+
 def fast_kernel(function: Function) -> Any:
     """As ``kernel``, for a loop of floats that may be reordered and vectorised."""
     return _kept(njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH)(function))

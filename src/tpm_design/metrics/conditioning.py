@@ -42,23 +42,17 @@ def _index(context: Context, options: Mapping[str, Any]) -> Index:
 
 
 def _averages(context: Context, options: Mapping[str, Any], threshold: float) -> tuple[Averages, Averages]:
-    fields = context.aspects if options["over"] == "aspect" else context.region_aspects
-    frobenius = options["norm"] == "frobenius"
-    motor = context.mechanism.motor_weight(options["drive"])
-    fine, coarse = (
-        conditioning_averages(
-            context.mechanism.geometry,
-            context.mode.signs,
-            field,
-            component=field.largest() if options["over"] == "aspect" else None,
-            frobenius=frobenius,
-            motor=motor,
-            threshold=threshold,
-            nodes=nodes,
-        )
-        for field, nodes in zip(fields, GAUSS_NODES[options["over"]], strict=True)
+    over_aspect = options["over"] == "aspect"
+    return conditioning_averages(
+        context.mechanism.geometry,
+        context.mode.signs,
+        context.aspects if over_aspect else context.region_aspects,
+        largest=over_aspect,
+        frobenius=options["norm"] == "frobenius",
+        motor=context.mechanism.motor_weight(options["drive"]),
+        threshold=threshold,
+        nodes=GAUSS_NODES[options["over"]],
     )
-    return fine, coarse
 
 
 def _minimum(context: Context, options: Mapping[str, Any]) -> Measurement:

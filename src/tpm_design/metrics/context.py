@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
-from tpm_design.workspace.aspects import RayField, locate, mode_field, region_field
-from tpm_design.workspace.extremes import Extreme, least_over_region
+from tpm_design.workspace.aspects import RayField, locate, located, mode_fields, region_fields
+from tpm_design.workspace.extremes import Extreme, extremes_over_region
 from tpm_design.workspace.fold_clearance import fold_clearance
 from tpm_design.workspace.indices import DETERMINANT, EXTENT, REACH, Index
 from tpm_design.workspace.loci import LocusDistance, locus_distance
@@ -72,8 +72,12 @@ class Context:
 
     def least(self, index: Index) -> Extreme:
         """Least value of an index over the region (greatest for sign −1)."""
-        return least_over_region(
-            self.mechanism.geometry, self.mode.signs, self.placed, index, self.poses, self.spacing
+        return self.extremes(index)[0]
+
+    def extremes(self, *indices: Index) -> tuple[Extreme, ...]:
+        """As ``least``, of several indices."""
+        return extremes_over_region(
+            self.mechanism.geometry, self.mode.signs, self.placed, indices, self.poses, self.spacing
         )
 
     @cached_property
@@ -107,17 +111,17 @@ class Context:
     @cached_property
     def sides(self) -> tuple[Sides, ...]:
         """Every determinant over the region, in the order of the mechanism."""
-        return tuple(self._side(part) for part in range(len(self.mechanism.kind.determinants)))
+        signs = self.lattice_sides
+        indices = [Index(DETERMINANT, part=part, sign=sign) for part, sign in enumerate(signs)]
+        return tuple(
+            Sides(sign * found.value, found.error, tuple(sign * piece for piece in found.pieces))
+            for sign, found in zip(signs, self.extremes(*indices), strict=True)
+        )
 
     def side_driven_by(self, drive: str) -> Sides:
         """The determinant whose zero takes control from these actuators: W for motors, V for joints."""
         kind = self.mechanism.kind
         return self.sides[kind.determinants.index(kind.guard(drive))]
-
-    def _side(self, part: int) -> Sides:
-        sign = self.lattice_sides[part]
-        extreme = self.least(Index(DETERMINANT, part=part, sign=sign))
-        return Sides(sign * extreme.value, extreme.error, tuple(sign * piece for piece in extreme.pieces))
 
     @cached_property
     def _survey(self) -> Survey:
@@ -148,20 +152,19 @@ class Context:
     @cached_property
     def size(self) -> Extreme:
         """Longest side (m) of the bounding box of the joint centres over the region."""
-        sides = []
-        for axis in range(3):
-            low = self.least(Index(EXTENT, part=axis, sign=1.0))
-            high = self.least(Index(EXTENT, part=axis, sign=-1.0))
-            sides.append(Extreme(high.value - low.value, high.error + low.error, high.pose, ()))
+        ends = [Index(EXTENT, part=axis, sign=sign) for sign in (1.0, -1.0) for axis in range(3)]
+        found = self.extremes(*ends)
+        sides = [
+            Extreme(high.value - low.value, high.error + low.error, high.pose, ())
+            for low, high in zip(found[:3], found[3:], strict=True)
+        ]
         return max(sides, key=lambda side: side.value)
 
     def mode_rays(self, margin: float, *, sided: bool) -> tuple[RayField, RayField]:
         """Ray fields of the whole mode at the working order and at a coarser one."""
         order = rays_for(self.volume_rtol)
-        return (
-            mode_field(self.mechanism, self.mode, order=order, sided=sided, floor=margin),
-            mode_field(self.mechanism, self.mode, order=coarser(order), sided=sided, floor=margin),
-        )
+        orders = order, coarser(order)
+        return mode_fields(self.mechanism, self.mode, orders=orders, sided=sided, floor=margin)
 
     @cached_property
     def aspects(self) -> tuple[RayField, RayField]:
@@ -172,11 +175,12 @@ class Context:
     def region_aspects(self) -> tuple[RayField, RayField]:
         """Ray fields of the region's parts in each aspect, fine and coarse."""
         order = max(3, (rays_for(self.volume_rtol) + 1) // 3)
-        return (
-            region_field(self.mechanism, self.mode, self.placed, order=order),
-            region_field(self.mechanism, self.mode, self.placed, order=order - 1),
-        )
+        return region_fields(self.mechanism, self.mode, self.placed, orders=(order, order - 1))
 
     def aspect_of(self, field: RayField, pose: tuple[float, float, float]) -> int | None:
         """Component of ``field`` that holds ``pose``."""
         return locate(self.mechanism, self.mode, field, pose)
+
+    def aspects_of(self, field: RayField, poses: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Components (N,) of ``field`` that hold poses (N, 3), −1 where none does."""
+        return located(self.mechanism, self.mode, field, poses)

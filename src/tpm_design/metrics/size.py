@@ -36,11 +36,13 @@ def _actuator_range(context: Context, options: Mapping[str, Any]) -> Measurement
     if not context.reachable:
         return Measurement.undefined("the region is not reachable")
     motor = context.mechanism.motor_weight(options["drive"])
-    travels = []
-    for part in range(context.mechanism.kind.limb_count):
-        low = context.least(Index(ACTUATOR, part=part, motor=motor, sign=1.0))
-        high = context.least(Index(ACTUATOR, part=part, motor=motor, sign=-1.0))
-        travels.append((high.value - low.value, high.error + low.error))
+    count = context.mechanism.kind.limb_count
+    ends = [Index(ACTUATOR, part=p, motor=motor, sign=sign) for sign in (1.0, -1.0) for p in range(count)]
+    found = context.extremes(*ends)
+    travels = [
+        (high.value - low.value, high.error + low.error)
+        for low, high in zip(found[:count], found[count:], strict=True)
+    ]
     return Measurement(*max(travels))
 
 

@@ -75,37 +75,23 @@ def _largest_share(context: Context, field: RayField) -> float:
     """Share of the region in one aspect; parts of equal sides may be joined outside the region."""
     if not field.volumes.size:
         return 0.0
-    keys = []
-    for component in range(field.volumes.size):
-        first = int(np.argmax(field.component == component))
-        code = int(field.segments.code[first])
-        keys.append((code, component))
-    by_code: dict[int, list[int]] = {}
-    for code, component in keys:
-        by_code.setdefault(code, []).append(component)
+    codes = field.sides
+    shared = np.flatnonzero(np.bincount(codes)[codes] > 1)
+    aspects = np.zeros_like(codes)
+    if shared.size:
+        aspects[shared] = context.aspects_of(context.aspects[0], field.middles[shared])
+        # what lies in no aspect is joined with nothing
+        lost = shared[aspects[shared] < 0]
+        aspects[lost] = -1 - lost
     totals: dict[tuple[int, int], float] = {}
-    for code, components in by_code.items():
-        for component in components:
-            aspect = _aspect_of_component(context, field, component) if len(components) > 1 else 0
-            totals[code, aspect] = totals.get((code, aspect), 0.0) + float(field.volumes[component])
+    for key, volume in zip(zip(codes.tolist(), aspects.tolist(), strict=True), field.volumes, strict=True):
+        totals[key] = totals.get(key, 0.0) + float(volume)
     return max(totals.values()) / field.whole
 
 
-def _aspect_of_component(context: Context, field: RayField, component: int) -> int:
-    members = np.flatnonzero(field.component == component)
-    lengths = field.segments.end[members] - field.segments.start[members]
-    member = members[np.argmax(lengths)]
-    middle = 0.5 * (field.segments.start[member] + field.segments.end[member])
-    direction = field.rays.directions[field.segments.ray[member]]
-    pose = np.asarray(field.origin) + middle * np.asarray(field.scale) * direction
-    found = context.aspect_of(context.aspects[0], (float(pose[0]), float(pose[1]), float(pose[2])))
-    return -1 - component if found is None else found
-
-
 def _point_shares(context: Context) -> tuple[float, float]:
-    aspects = [context.aspect_of(context.aspects[0], tuple(pose)) for pose in context.poses]
-    found = [aspect for aspect in aspects if aspect is not None]
-    share = max((found.count(aspect) for aspect in set(found)), default=0) / len(aspects)
+    found = context.aspects_of(context.aspects[0], context.poses)
+    share = int(np.bincount(found[found >= 0]).max(initial=0)) / found.size
     return share, share
 
 

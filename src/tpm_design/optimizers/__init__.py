@@ -24,7 +24,7 @@ OPTIMIZERS: Mapping[str, Optimizer] = MappingProxyType(
     }
 )
 
-ONE_OBJECTIVE, FRONT = "scipy.differential_evolution", "pymoo.nsga2"
+ONE_OBJECTIVE, FRONT = "multistart", "pymoo.nsga2"
 """The methods that search where a study names none."""
 
 

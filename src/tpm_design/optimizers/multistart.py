@@ -92,6 +92,24 @@ def multistart(search: Search, seed: int) -> str:
     return _Course(search, seed).run()
 
 
+class _UnderWay:
+    """A task, the points it waits for, and the best feasible place it saw."""
+
+    def __init__(self, task: Task, asked: FloatArray) -> None:
+        self._task, self.asked, self.over = task, asked, False
+        self.best: Place | None = None
+
+    def go_on(self, found: Outcomes) -> None:
+        """Hand over the outcomes and wait for the next points."""
+        for place in places(self.asked, found):
+            if place.violation == 0.0 and (self.best is None or place.before(self.best)):
+                self.best = place
+        try:
+            self.asked = self._task.send(found)
+        except StopIteration:
+            self.over = True
+
+
 class _Course:
     def __init__(self, search: Search, seed: int) -> None:
         self._search = search
@@ -104,27 +122,24 @@ class _Course:
         self._optima: list[Optimum] = []
         self._begun = self._ended = self._landed = self._hops = 0
         self._finishing = False
+        self._left: list[Place] = []
 
     def run(self) -> str:
         self._starts.sample()
-        under_way: list[tuple[Task, FloatArray]] = []
+        under_way: list[_UnderWay] = []
         while not self._few_left() and not self._converged():
             while len(under_way) < ABREAST:
                 task = self._next_task()
                 if (first := next(task, None)) is not None:
-                    under_way.append((task, first))
-            points = np.vstack([asked for _, asked in under_way])
-            found = self._evaluated(points)
-            going_on, place = [], 0
-            for task, asked in under_way:
-                part = slice(place, place + len(asked))
-                place += len(asked)
-                answer = Outcomes(found.objective[part], found.constraints[part], found.merit[part])
-                try:
-                    going_on.append((task, task.send(answer)))
-                except StopIteration:
-                    continue
-            under_way = going_on
+                    under_way.append(_UnderWay(task, first))
+            found = self._evaluated(np.vstack([one.asked for one in under_way]))
+            place = 0
+            for one in under_way:
+                part = slice(place, place + len(one.asked))
+                place += len(one.asked)
+                one.go_on(Outcomes(found.objective[part], found.constraints[part], found.merit[part]))
+            self._left = [*self._left, *(one.best for one in under_way if one.over and one.best)]
+            under_way = [one for one in under_way if not one.over]
         if self._designs <= ENUMERATED:
             self._enumerate()
             return "Converged: every design was evaluated."
@@ -145,6 +160,11 @@ class _Course:
 
     def _next_task(self) -> Task:
         best = self._best()
+        while self._left:
+            left = self._left.pop()
+            if best is None or left.improves(best.place):
+                self._left = []
+                return self._from_left(left)
         if self._ended >= FIRST_STARTS and best is not None:
             if not best.finished and not self._finishing:
                 return self._finish(best)
@@ -159,6 +179,12 @@ class _Course:
         landing = yield from self._descended(start, RADIUS)
         self._ended += 1
         yield from self._arrived(landing, independent=True)
+
+    def _from_left(self, left: Place) -> Task:
+        """From the best place that a search saw, where that is better than any optimum: it went elsewhere."""
+        start = yield from looked_at(left.point)
+        landing = yield from self._descended(start, POLISH_RADII[0])
+        yield from self._arrived(landing, independent=False)
 
     def _hop(self, best: Optimum) -> Task:
         sigma = HOPS[self._hops // 2 % len(HOPS)]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tpm_design.synthesis.body_forms import BodyForm
 from tpm_design.synthesis.free_set import FreeSet
-from tpm_design.workspace.extremes import least_over_region
+from tpm_design.workspace.extremes import extremes_over_region
 from tpm_design.workspace.region_geometry import nearest_pose
 from tpm_design.workspace.sampling import lattice
 
@@ -134,8 +134,8 @@ def contacts(
         lowest = lowest[np.argsort(margins[number][lowest], kind="stable")]
         lowest = lowest[_unlike(form, free, centre, sizes, (poses[lowest] - centre) / half, number)]
         for n in lowest[:MOST_OF_A_BOUND]:
-            found = least_over_region(
-                free.mechanism.geometry, free.mode.signs, region, index, poses[n : n + 1], spacing
+            (found,) = extremes_over_region(
+                free.mechanism.geometry, free.mode.signs, region, [index], poses[n : n + 1], spacing
             )
             units.append((np.asarray(found.pose) - centre) / half)
             bounds.append(number)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from tpm_design.mechanisms.fold_lines import FoldLine
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
-from tpm_design.workspace.aspects import mode_field, ray_field
-from tpm_design.workspace.directions import ALL_OCTANTS, ray_set
+from tpm_design.workspace.aspects import ball_field, mode_field
 from tpm_design.workspace.indices import DETERMINANT, REACH, Index, index_values
 
 FloatArray = NDArray[np.float64]
@@ -94,25 +93,18 @@ class FreeSet:
 
     def exits(self, centre: FloatArray) -> FloatArray:
         """Poses (N, 3) at which rays from a pose of the set leave it; none where the pose is outside."""
-        rays = ray_set(ALL_OCTANTS, RAY_ORDER)
         x, y, z = centre.tolist()
-        field = ray_field(
-            self.mechanism,
-            self.mode,
-            rays=rays,
-            limits=2.0 / rays.lengths,
-            sided=True,
-            floor=self.floor,
-            origin=(x, y, z),
-            scale=(self.length,) * 3,
+        radius = 2.0 * self.length
+        field = ball_field(
+            self.mechanism, self.mode, centre=(x, y, z), radius=radius, order=RAY_ORDER, floor=self.floor
         )
         found = field.segments
         # the first piece of each ray, on this side of the determinants
         first = np.flatnonzero((found.start < 1e-6) & (found.code == self._code))
-        if first.size < len(rays.directions):
+        if first.size < len(field.rays.directions):
             return np.zeros((0, 3))
-        along = found.end[first, None] * rays.directions[found.ray[first]]
-        return np.asarray(centre + self.length * along)
+        along = found.end[first, None] * field.rays.directions[found.ray[first]]
+        return np.asarray(centre + radius * along)
 
     def tangents(self, poses: FloatArray, near: float, around: float) -> Tangents:
         """Planes that touch the set's bounds close to poses (N, 3): of every bound that is, to first order,

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.arithmetic import kernel
+from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.directions import ALL_OCTANTS, Octant, RaySet, ray_set
 from tpm_design.workspace.joined_sets import find, join
 from tpm_design.workspace.poses import aspect_code
-from tpm_design.workspace.rays import Segments, trace
+from tpm_design.workspace.rays import Segments, traced
 from tpm_design.workspace.region_geometry import BOX, CYLINDER, PlacedRegion
+
+# of the coarse field where a fine one is asked for alone
+LEAST_ORDER = 2
 
 
 @dataclass(frozen=True)
@@ -22,7 +26,8 @@ class RayField:
     """Rays through space and the parts of them that lie in the workspace.
 
     ``origin``, ``scale``: pose = origin + t · scale · direction. ``component`` (S,): which connected set
-    a segment belongs to. ``volumes`` (C,): their volumes (m³). ``whole`` (m³): volume of all the rays.
+    a segment belongs to. Of these sets: ``volumes`` (C,) in m³, ``sides`` (C,) the code of their segments,
+    ``middles`` (C, 3) the pose (m) in the middle of the longest one. ``whole`` (m³): volume of all the rays.
     """
 
     origin: tuple[float, float, float]
@@ -31,6 +36,8 @@ class RayField:
     segments: Segments
     component: NDArray[np.int64]
     volumes: NDArray[np.float64]
+    sides: NDArray[np.int64]
+    middles: NDArray[np.float64]
     whole: float
 
     def largest(self) -> int | None:
@@ -38,7 +45,7 @@ class RayField:
         return int(np.argmax(self.volumes)) if self.volumes.size else None
 
 
-@kernel
+@inner
 def _components(rays, start, end, code, neighbours, weights):  # type: ignore[no-untyped-def]
     """Join segments of neighbouring rays that have one code and overlap; number the sets in order.
 
@@ -70,46 +77,119 @@ def _components(rays, start, end, code, neighbours, weights):  # type: ignore[no
     return component, volumes[:count]
 
 
-def ray_field(
+@inner
+def _longest(segments, component, count, origin, steps):  # type: ignore[no-untyped-def]
+    """Code (C,) of each set's segments, and the pose (C, 3) in the middle of the longest one."""
+    rays, start, end, code = segments
+    sides, middles = np.empty(count, np.int64), np.empty((count, 3))
+    longest = np.full(count, -1.0)
+    for s in range(rays.size):
+        number = component[s]
+        if end[s] - start[s] > longest[number]:
+            longest[number] = end[s] - start[s]
+            sides[number] = code[s]
+            t = 0.5 * (start[s] + end[s])
+            for axis in range(3):
+                middles[number, axis] = origin[axis] + t * steps[rays[s], axis]
+    return sides, middles
+
+
+@inner
+def _traced_and_joined(geometry, mode, sided, part_count, floor, origin, scale, rays):  # type: ignore[no-untyped-def]
+    """Segments of the rays, the set of each, volumes, sides and middles of the sets, volume of all rays."""
+    directions, limits, neighbours, weights = rays
+    steps = np.empty(directions.shape)
+    for n in range(weights.size):
+        for axis in range(3):
+            steps[n, axis] = directions[n, axis] * scale[axis]
+    segments = traced(geometry, mode, sided, part_count, floor, origin, steps, limits)
+    ray, start, end, code = segments
+    component, volumes = _components(ray, start, end, code, neighbours, weights)
+    volumes *= abs(scale[0] * scale[1] * scale[2])
+    sides, middles = _longest(segments, component, volumes.size, origin, steps)
+    return segments, component, volumes, sides, middles
+
+
+@kernel
+def _two_fields(geometry, mode, sided, part_count, floor, origin, scale, fine, coarse):  # type: ignore[no-untyped-def]
+    """As ``_traced_and_joined``, of two sets of rays."""
+    return (
+        _traced_and_joined(geometry, mode, sided, part_count, floor, origin, scale, fine),
+        _traced_and_joined(geometry, mode, sided, part_count, floor, origin, scale, coarse),
+    )
+
+
+def _fields(
     mechanism: Mechanism,
     mode: Mode,
+    rays: tuple[RaySet, RaySet],
+    limits: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
-    rays: RaySet,
-    limits: NDArray[np.float64],
     sided: bool,
     floor: float = 0.0,
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
-) -> RayField:
-    """Trace the rays and join what is connected."""
-    segments = trace(
-        mechanism.geometry,
-        mode.signs,
-        determinant_count=len(mechanism.kind.determinants),
-        sided=sided,
-        floor=floor,
-        origin=origin,
-        scale=scale,
-        directions=rays.directions,
-        limits=limits,
+    scale: tuple[float, float, float],
+) -> tuple[RayField, RayField]:
+    """Trace the rays and join what is connected. ``sided``: cut where a determinant changes side or falls to
+    ``floor``; otherwise reach alone. ``limits`` (N,): ray parameters at which the rays end."""
+    fine, coarse = (
+        (each.directions, ends, each.neighbours, each.weights)
+        for each, ends in zip(rays, limits, strict=True)
     )
-    component, volumes = _components(
-        segments.ray, segments.start, segments.end, segments.code, rays.neighbours, rays.weights
-    )
+    count = len(mechanism.kind.determinants)
+    found = _two_fields(mechanism.geometry, mode.signs, sided, count, floor, origin, scale, fine, coarse)
     cell = abs(scale[0] * scale[1] * scale[2])
-    volumes *= cell
-    whole = cell * float(rays.weights @ limits**3) / 3.0
-    return RayField(origin, scale, rays, segments, component, volumes, whole)
+    one, other = (
+        RayField(
+            origin=origin,
+            scale=scale,
+            rays=each,
+            segments=Segments(*segments),
+            component=component,
+            volumes=volumes,
+            sides=sides,
+            middles=middles,
+            whole=cell * float(each.weights @ ends**3) / 3.0,
+        )
+        for each, ends, (segments, component, volumes, sides, middles) in zip(
+            rays, limits, found, strict=True
+        )
+    )
+    return one, other
 
 
-def mode_field(mechanism: Mechanism, mode: Mode, *, order: int, sided: bool, floor: float = 0.0) -> RayField:
-    """The whole workspace of the mode, by ``order``² rays per square from the origin."""
-    rays = ray_set(mode_octants(mode), order)
+def mode_fields(
+    mechanism: Mechanism, mode: Mode, *, orders: tuple[int, int], sided: bool, floor: float = 0.0
+) -> tuple[RayField, RayField]:
+    """The whole workspace of the mode, by the square of each order of rays per square from the origin."""
+    octants = mode_octants(mode)
+    fine, coarse = ray_set(octants, orders[0]), ray_set(octants, orders[1])
     half = np.asarray(mechanism.reach_half_axes())
     radius = float(half.max())
     x, y, z = (half / radius).tolist()
-    limits = radius / rays.lengths
-    return ray_field(mechanism, mode, rays=rays, limits=limits, sided=sided, floor=floor, scale=(x, y, z))
+    limits = radius / fine.lengths, radius / coarse.lengths
+    return _fields(mechanism, mode, (fine, coarse), limits, sided=sided, floor=floor, scale=(x, y, z))
+
+
+def mode_field(mechanism: Mechanism, mode: Mode, *, order: int, sided: bool, floor: float = 0.0) -> RayField:
+    """As ``mode_fields``, the field of one order alone."""
+    return mode_fields(mechanism, mode, orders=(order, LEAST_ORDER), sided=sided, floor=floor)[0]
+
+
+def ball_field(
+    mechanism: Mechanism,
+    mode: Mode,
+    *,
+    centre: tuple[float, float, float],
+    radius: float,
+    order: int,
+    floor: float = 0.0,
+) -> RayField:
+    """Rays every way from ``centre``, as far as ``radius`` (m), cut as sided ones of ``mode_fields``."""
+    rays = ray_set(ALL_OCTANTS, order)
+    limits, scale = 1.0 / rays.lengths, (radius, radius, radius)
+    both = (rays, rays), (limits, limits)
+    return _fields(mechanism, mode, *both, sided=True, floor=floor, origin=centre, scale=scale)[0]
 
 
 def mode_octants(mode: Mode) -> tuple[Octant, ...]:
@@ -122,36 +202,78 @@ def _octants_of(signs: tuple[float, float, float]) -> tuple[Octant, ...]:
     return tuple(o for o in ALL_OCTANTS if all(s in (0.0, float(k)) for s, k in zip(signs, o, strict=True)))
 
 
-def region_field(mechanism: Mechanism, mode: Mode, region: PlacedRegion, *, order: int) -> RayField:
-    """The parts of a solid region in each aspect, by ``order``² rays per square from its centre."""
-    rays = ray_set(ALL_OCTANTS, order)
-    if region.form == BOX:
-        limits = np.ones(rays.weights.size)
-    elif region.form == CYLINDER:
-        across = np.linalg.norm(rays.directions[:, :2], axis=1)
-        limits = np.minimum(1.0 / across, 1.0 / np.abs(rays.directions[:, 2]))
-    else:
-        limits = 1.0 / rays.lengths
-    return ray_field(
-        mechanism, mode, rays=rays, limits=limits, sided=True, origin=region.centre, scale=region.half
+def region_fields(
+    mechanism: Mechanism, mode: Mode, region: PlacedRegion, *, orders: tuple[int, int]
+) -> tuple[RayField, RayField]:
+    """The parts of a solid region in each aspect, by the square of each order of rays per square from its
+    centre."""
+    fine, coarse = ray_set(ALL_OCTANTS, orders[0]), ray_set(ALL_OCTANTS, orders[1])
+    limits = _region_limits(region.form, orders[0]), _region_limits(region.form, orders[1])
+    return _fields(
+        mechanism, mode, (fine, coarse), limits, sided=True, origin=region.centre, scale=region.half
     )
+
+
+@lru_cache(maxsize=64)
+def _region_limits(form: int, order: int) -> NDArray[np.float64]:
+    rays = ray_set(ALL_OCTANTS, order)
+    if form == BOX:
+        return np.ones(rays.weights.size)
+    if form == CYLINDER:
+        across = np.linalg.norm(rays.directions[:, :2], axis=1)
+        return np.minimum(1.0 / across, 1.0 / np.abs(rays.directions[:, 2]))
+    return 1.0 / rays.lengths
+
+
+@kernel
+def _located(geometry, mode, origin, scale, directions, segments, component, poses):  # type: ignore[no-untyped-def]
+    """As ``located``."""
+    rays, start, end, codes = segments
+    found = np.full(poses.shape[0], -1, np.int64)
+    for n in range(poses.shape[0]):
+        x, y, z = poses[n, 0], poses[n, 1], poses[n, 2]
+        code = aspect_code(geometry, mode, x, y, z)
+        if code == 0:
+            continue
+        x, y, z = x - origin[0], y - origin[1], z - origin[2]
+        least = math.inf
+        for s in range(codes.size):
+            if codes[s] == code:
+                ray = rays[s]
+                u, v, w = (
+                    scale[0] * directions[ray, 0],
+                    scale[1] * directions[ray, 1],
+                    scale[2] * directions[ray, 2],
+                )
+                along = (u * x + v * y + w * z) / (u * u + v * v + w * w)
+                along = min(end[s], max(start[s], along))
+                distance = math.sqrt((along * u - x) ** 2 + (along * v - y) ** 2 + (along * w - z) ** 2)
+                if distance < least:
+                    least = distance
+                    found[n] = component[s]
+    return found
+
+
+def located(
+    mechanism: Mechanism, mode: Mode, field: RayField, poses: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Components (N,) of the field that hold poses (N, 3): of the segment of a pose's sides on the nearest
+    ray that overlaps its radius, −1 where the pose lies in no aspect."""
+    parts = field.segments
+    found: NDArray[np.int64] = _located(
+        mechanism.geometry,
+        mode.signs,
+        field.origin,
+        field.scale,
+        field.rays.directions,
+        (parts.ray, parts.start, parts.end, parts.code),
+        field.component,
+        np.ascontiguousarray(poses, dtype=np.float64),
+    )
+    return found
 
 
 def locate(mechanism: Mechanism, mode: Mode, field: RayField, pose: tuple[float, float, float]) -> int | None:
-    """Component of the field that holds a pose: the segment of its sides on the nearest ray that overlaps
-    its radius, or None where the pose lies in no aspect."""
-    x, y, z = pose
-    code = aspect_code(mechanism.geometry, mode.signs, x, y, z)
-    candidates = np.flatnonzero(field.segments.code == code)
-    if code == 0 or not candidates.size:
-        return None
-    steps = field.rays.directions * np.asarray(field.scale)
-    offset = np.asarray(pose) - np.asarray(field.origin)
-    chosen = steps[field.segments.ray[candidates]]
-    along = np.clip(
-        (chosen @ offset) / (chosen**2).sum(axis=1),
-        field.segments.start[candidates],
-        field.segments.end[candidates],
-    )
-    distances = np.linalg.norm(along[:, None] * chosen - offset, axis=1)
-    return int(field.component[candidates[np.argmin(distances)]])
+    """Component of the field that holds one pose, or None; as ``located``."""
+    component = int(located(mechanism, mode, field, np.array([pose]))[0])
+    return None if component < 0 else component

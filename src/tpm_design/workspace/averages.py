@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,14 +52,15 @@ def _threshold_crossing(geometry, mode, frobenius, motor, threshold, origin, ste
     return 0.5 * (low + high)
 
 
-@kernel
-def _integrate(  # type: ignore[no-untyped-def]
-    geometry, mode, frobenius, motor, threshold, origin, scale, directions, weights, segments, nodes
-):
-    rays, starts, ends = segments
+@inner
+def _integrate(geometry, mode, frobenius, motor, threshold, origin, scale, field, nodes):  # type: ignore[no-untyped-def]
+    """Integrals of ``Averages`` over all segments of a field of the component wanted, −1: of all."""
+    directions, weights, rays, starts, ends, component, wanted = field
     places, shares = nodes
     volume, total, above, least = 0.0, 0.0, 0.0, math.inf
     for s in range(rays.size):
+        if wanted >= 0 and component[s] != wanted:
+            continue
         ray = rays[s]
         step = (
             scale[0] * directions[ray, 0],
@@ -97,6 +99,17 @@ def _integrate(  # type: ignore[no-untyped-def]
     return volume, total, above, least
 
 
+@kernel
+def _two_integrals(  # type: ignore[no-untyped-def]
+    geometry, mode, frobenius, motor, threshold, origin, scale, fields, nodes
+):
+    """As ``_integrate``, of a fine field and a coarse one, each with its nodes."""
+    return (
+        _integrate(geometry, mode, frobenius, motor, threshold, origin, scale, fields[0], nodes[0]),
+        _integrate(geometry, mode, frobenius, motor, threshold, origin, scale, fields[1], nodes[1]),
+    )
+
+
 @cache
 def _nodes(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Places in [0, 1] and weights, crowded at both ends of a segment."""
@@ -108,32 +121,47 @@ def _nodes(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def conditioning_averages(
     geometry: object,
     signs: object,
-    field: RayField,
+    fields: tuple[RayField, RayField],
     *,
-    component: int | None,
+    largest: bool,
     frobenius: bool,
     motor: float,
     threshold: float,
-    nodes: int,
-) -> Averages:
-    """Integrals of 1/κ over one component of the field, or over all its segments, by ``nodes`` along each.
+    nodes: tuple[int, int],
+) -> tuple[Averages, Averages]:
+    """Integrals of 1/κ over the ``largest`` component of a field, or over all its segments, by ``nodes``
+    along each: of a fine field and of a coarse one of the same origin and scale.
 
     Nodes crowd at the ends of a segment, where 1/κ goes to zero with the root of the distance.
     """
-    keep = slice(None) if component is None else field.component == component
-    chosen = (field.segments.ray[keep], field.segments.start[keep], field.segments.end[keep])
-    volume, total, above, least = _integrate(
+    found = _two_integrals(
         geometry,
         signs,
         frobenius,
         motor,
         threshold,
-        field.origin,
-        field.scale,
+        fields[0].origin,
+        fields[0].scale,
+        (_chosen(fields[0], largest), _chosen(fields[1], largest)),
+        (_nodes(nodes[0]), _nodes(nodes[1])),
+    )
+    cell = float(abs(np.prod(fields[0].scale)))
+    fine, coarse = (
+        Averages(cell * volume, cell * total, cell * above, least if volume > 0.0 else 0.0)
+        for volume, total, above, least in found
+    )
+    return fine, coarse
+
+
+def _chosen(field: RayField, largest: bool) -> tuple[Any, ...]:
+    """A field as ``_integrate`` takes it."""
+    wanted = field.largest() if largest else None
+    return (
         field.rays.directions,
         field.rays.weights,
-        chosen,
-        _nodes(nodes),
+        field.segments.ray,
+        field.segments.start,
+        field.segments.end,
+        field.component,
+        -1 if wanted is None else wanted,
     )
-    cell = float(abs(np.prod(field.scale)))
-    return Averages(cell * volume, cell * total, cell * above, least if volume > 0.0 else 0.0)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
-from tpm_design.workspace.indices import Index, index_value, index_values
+from tpm_design.workspace.indices import Index, index_value, values_at
 from tpm_design.workspace.region_geometry import POINTS, PlacedRegion, nearest, surface_frame
 
 EIGHTHS = 8
@@ -76,13 +77,7 @@ def _best_of_eighths(region, points, values, stride):  # type: ignore[no-untyped
     return best
 
 
-@kernel
-def _chosen(region, points, values):  # type: ignore[no-untyped-def]
-    """Where to polish from: each eighth's best pose, and the best of every second pose alone."""
-    return _best_of_eighths(region, points, values, 1), _best_of_eighths(region, points, values, 2)
-
-
-@kernel
+@inner
 def _polished(geometry, mode, region, index, points, values, chosen, step, smallest):  # type: ignore[no-untyped-def]
     """(value, decrease by the smallest steps, x, y, z) (K, 5) from each chosen pose; rows of +inf where
     it is −1."""
@@ -96,40 +91,66 @@ def _polished(geometry, mode, region, index, points, values, chosen, step, small
     return out
 
 
-def least_over_region(
+@inner
+def _least(geometry, mode, region, index, points, spacing):  # type: ignore[no-untyped-def]
+    """Value, error, pose and pieces (8,) of ``Extreme``, the index's sign still on them."""
+    values = values_at(geometry, mode, index, points)
+    if region.form == POINTS:
+        n = values.argmin()
+        value, error, pose = values[n], 0.0, (points[n, 0], points[n, 1], points[n, 2])
+        pieces = np.full(EIGHTHS, value)
+    else:
+        # each eighth's best pose, then the best of every second pose alone where that is another one
+        chosen = np.empty(2 * EIGHTHS, np.int64)
+        chosen[:EIGHTHS] = _best_of_eighths(region, points, values, 1)
+        chosen[EIGHTHS:] = _best_of_eighths(region, points, values, 2)
+        halved = np.empty(EIGHTHS, np.int64)
+        for eighth in range(EIGHTHS):
+            halved[eighth] = eighth + EIGHTHS
+            if chosen[eighth + EIGHTHS] == chosen[eighth]:
+                halved[eighth] = eighth
+                chosen[eighth + EIGHTHS] = -1
+        step, smallest = 0.5 * spacing, FINEST_STEP * spacing
+        found = _polished(geometry, mode, region, index, points, values, chosen, step, smallest)
+        best = found[:, 0].argmin()
+        value, pose = found[best, 0], (found[best, 2], found[best, 3], found[best, 4])
+        error = found[halved, 0].min() - value + found[best, 1]
+        pieces = np.where(np.isfinite(found[:EIGHTHS, 0]), found[:EIGHTHS, 0], value)
+        pieces[pieces.argmin()] = value
+    return value, error, pose, pieces
+
+
+@kernel
+def _extremes(geometry, mode, region, indices, points, spacing):  # type: ignore[no-untyped-def]
+    """One row for each row of ``indices`` (quantity, part, motor, sign): value, error, pose, pieces."""
+    out = np.empty((indices.shape[0], 5 + EIGHTHS))
+    for k in range(indices.shape[0]):
+        sign = indices[k, 3]
+        index = Index(int(indices[k, 0]), int(indices[k, 1]), indices[k, 2], sign)
+        value, error, pose, pieces = _least(geometry, mode, region, index, points, spacing)
+        # shrinks with the lattice, so that a finer look at the same pose never contradicts a coarser one
+        longest = 2.0 * max(region.half)
+        floor = ERROR_FLOOR * abs(value) * (min(1.0, spacing / longest) if longest > 0.0 else 1.0)
+        out[k, 0], out[k, 1] = sign * value, error + floor
+        for axis in range(3):
+            out[k, 2 + axis] = pose[axis]
+        for eighth in range(EIGHTHS):
+            out[k, 5 + eighth] = sign * pieces[eighth]
+    return out
+
+
+def extremes_over_region(
     geometry: object,
     signs: object,
     region: PlacedRegion,
-    index: Index,
+    indices: Sequence[Index],
     points: NDArray[np.float64],
     spacing: float,
-) -> Extreme:
-    """The least value of the index (the greatest for sign −1) over the region.
+) -> tuple[Extreme, ...]:
+    """The least value of each index (the greatest for sign −1) over the region.
 
     ``points`` (N, 3): the region's lattice; ``spacing`` (m) between its poses.
     """
-    values = index_values(geometry, signs, index, points)
-    if region.form == POINTS:
-        n = int(values.argmin())
-        value, error, pose, pieces = values[n], 0.0, points[n], np.full(EIGHTHS, values[n])
-    else:
-        fine, coarse = _chosen(region, points, values)
-        chosen = np.concatenate([fine, np.where(coarse == fine, -1, coarse)])
-        found = _polished(
-            geometry, signs, region, index, points, values, chosen, 0.5 * spacing, FINEST_STEP * spacing
-        )
-        best = int(found[:, 0].argmin())
-        value, pose = found[best, 0], found[best, 2:]
-        halved = np.where(coarse == fine, found[:EIGHTHS, 0], found[EIGHTHS:, 0])
-        error = halved.min() - value + found[best, 1]
-        pieces = np.where(np.isfinite(found[:EIGHTHS, 0]), found[:EIGHTHS, 0], value)
-        pieces[pieces.argmin()] = value
-    # shrinks with the lattice, so that a finer look at the same pose never contradicts a coarser one
-    longest = 2.0 * max(region.half)
-    floor = ERROR_FLOOR * abs(value) * (min(1.0, spacing / longest) if longest > 0.0 else 1.0)
-    return Extreme(
-        float(index.sign * value),
-        float(error + floor),
-        (float(pose[0]), float(pose[1]), float(pose[2])),
-        tuple((index.sign * pieces).tolist()),
-    )
+    table = np.array(indices, dtype=np.float64).reshape(-1, 4)
+    rows = _extremes(geometry, signs, region, table, points, spacing).tolist()
+    return tuple(Extreme(row[0], row[1], (row[2], row[3], row[4]), tuple(row[5:])) for row in rows)

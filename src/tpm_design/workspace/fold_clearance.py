@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tpm_design.arithmetic import kernel
+from tpm_design.arithmetic import short_kernel
 from tpm_design.mechanisms.fold_lines import FoldLine
 from tpm_design.workspace.region_geometry import POINTS, PlacedRegion, nearest, signed_distance
 
@@ -27,7 +27,7 @@ class FoldClearance:
     pose: tuple[float, float, float]
 
 
-@kernel
+@short_kernel
 def _nearest_of_points(region, point, direction):  # type: ignore[no-untyped-def]
     """Distance to the line of the nearest pose, and that pose."""
     least, best = math.inf, 0
@@ -45,7 +45,7 @@ def _nearest_of_points(region, point, direction):  # type: ignore[no-untyped-def
     return least, (region.points[best, 0], region.points[best, 1], region.points[best, 2])
 
 
-@kernel
+@short_kernel
 def _deepest(region, point, direction):  # type: ignore[no-untyped-def]
     """Least signed distance along the line, and the region's pose there."""
     px, py, pz = point

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms import equations
-from tpm_design.mechanisms.pointwise import columns, frobenius_row, least_margin
+from tpm_design.mechanisms.pointwise import frobenius_row, least_margin
 from tpm_design.mechanisms.velocity import (
     inverse_condition_2,
     inverse_condition_frobenius,
@@ -149,21 +149,29 @@ def index_value(geometry, mode, index, x, y, z):  # type: ignore[no-untyped-def]
     return signed if signed == signed else math.inf  # noqa: PLR0124
 
 
-@kernel
-def _index_values(geometry, mode, index, points):  # type: ignore[no-untyped-def]
+@inner
+def values_at(geometry, mode, index, points):  # type: ignore[no-untyped-def]
+    """``index_value`` at poses (N, 3)."""
     out = np.empty(points.shape[0])
+    if index.quantity == CONDITION_FROBENIUS:
+        # vectorised
+        x, y, z = points[:, 0].copy(), points[:, 1].copy(), points[:, 2].copy()
+        frobenius_row(geometry, mode, index.motor, x, y, z, out)
+        for n in range(out.size):
+            out[n] = index.sign * (out[n] if out[n] == out[n] else 0.0)
+        return out
     for n in range(points.shape[0]):
         out[n] = index_value(geometry, mode, index, points[n, 0], points[n, 1], points[n, 2])
     return out
+
+
+@kernel
+def _index_values(geometry, mode, index, points):  # type: ignore[no-untyped-def]
+    return values_at(geometry, mode, index, points)
 
 
 def index_values(
     geometry: object, signs: object, index: Index, points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """``index_value`` at poses (N, 3)."""
-    if index.quantity != CONDITION_FROBENIUS:
-        return np.asarray(_index_values(geometry, signs, index, points))
-    out = np.empty(len(points))
-    frobenius_row(geometry, signs, index.motor, *columns(points), out)
-    out[np.isnan(out)] = 0.0
-    return index.sign * out
+    return np.asarray(_index_values(geometry, signs, index, points))

@@ -83,7 +83,7 @@ def _exit(geometry, mode, base, normal, low, high):  # type: ignore[no-untyped-d
     return low
 
 
-@kernel
+@inner
 def _march(geometry, mode, determinant_count, part, bases, normals, step, limit):  # type: ignore[no-untyped-def]
     """Ways (F,) along the feelers to the first locus of one determinant; +inf where none was met before
     the march ended: one level after the first was met, or at ``limit``.
@@ -377,7 +377,7 @@ def _slide_on_rim(geometry, mode, region, part, start, best, step, smallest):  #
     return best, x, y, z
 
 
-@kernel
+@inner
 def _best_slide(geometry, mode, region, part, starts, distances, stride, step, smallest):  # type: ignore[no-untyped-def]
     """Slide from the nearest starts that lie apart; ``stride`` skips starts."""
     best, bx, by, bz = math.inf, math.nan, math.nan, math.nan
@@ -419,12 +419,74 @@ def _best_slide(geometry, mode, region, part, starts, distances, stride, step, s
     return best, bx, by, bz
 
 
-@kernel
+@inner
 def _signed_distances(region, points):  # type: ignore[no-untyped-def]
     out = np.empty(points.shape[0])
     for n in range(points.shape[0]):
         out[n] = signed_distance(region, points[n, 0], points[n, 1], points[n, 2])
     return out
+
+
+@inner
+def _lattice_crossings(values, grid):  # type: ignore[no-untyped-def]
+    """Poses (N, 3) between lattice neighbours of opposite sign, by linear interpolation."""
+    shape = values.shape
+    found, count = np.empty((3 * values.size, 3)), 0
+    for axis in range(3):
+        di, dj, dk = int(axis == 0), int(axis == 1), int(axis == 2)
+        for i in range(shape[0] - di):
+            for j in range(shape[1] - dj):
+                for k in range(shape[2] - dk):
+                    a, b = values[i, j, k], values[i + di, j + dj, k + dk]
+                    if (a > 0.0) != (b > 0.0):
+                        share = a / (a - b)
+                        for c in range(3):
+                            p, q = grid[i, j, k, c], grid[i + di, j + dj, k + dk, c]
+                            found[count, c] = p + share * (q - p)
+                        count += 1
+    return found[:count]
+
+
+@inner
+def _starts(inside, feeler_points, feeler_normals, ways, known):  # type: ignore[no-untyped-def]
+    """Poses (N, 3) near the locus: on the lattice, along feelers, known from elsewhere."""
+    starts = np.empty((inside.shape[0] + ways.size + known.shape[0], 3))
+    count = inside.shape[0]
+    starts[:count] = inside
+    for n in range(ways.size):
+        if math.isfinite(ways[n]):
+            for c in range(3):
+                starts[count, c] = feeler_points[n, c] + ways[n] * feeler_normals[n, c]
+            count += 1
+    starts[count : count + known.shape[0]] = known
+    return starts[: count + known.shape[0]]
+
+
+@kernel
+def _nearest_locus(  # type: ignore[no-untyped-def]
+    geometry, mode, region, part, determinants, grid, feeler_points, feeler_normals, known, spacing, limit
+):
+    """As ``locus_distance``: (fine, coarse) least distance and its pose from all starts and from half."""
+    inside = _lattice_crossings(determinants[part], grid)
+    if known.shape[0] > 0:
+        # what lies beyond a known point of the locus is not the nearest
+        limit = min(limit, max(0.0, _signed_distances(region, known).min()) + spacing)
+    ways = _march(
+        geometry,
+        mode,
+        determinants.shape[0],
+        part,
+        feeler_points,
+        feeler_normals,
+        0.5 * spacing,
+        limit,
+    )
+    starts = _starts(inside, feeler_points, feeler_normals, ways, known)
+    distances = _signed_distances(region, starts)
+    step, smallest = 0.5 * spacing, FINEST_STEP * spacing
+    fine = _best_slide(geometry, mode, region, part, starts, distances, 1, step, smallest)
+    coarse = _best_slide(geometry, mode, region, part, starts, distances, 2, step, smallest)
+    return fine, coarse
 
 
 def locus_distance(
@@ -447,53 +509,22 @@ def locus_distance(
     ``sampling.feelers``; ``known`` (N, 3): points of the locus found elsewhere; ``spacing`` (m) of the
     lattice; ``limit`` (m) at which feelers end at the latest.
     """
-    inner = _lattice_crossings(determinants[part], grid)
-    if len(known):
-        # what lies beyond a known point of the locus is not the nearest
-        limit = min(limit, max(0.0, float(_signed_distances(region, known).min())) + spacing)
-    ways = _march(
-        geometry, signs, len(determinants), part, feeler_points, feeler_normals, 0.5 * spacing, limit
-    )
-    outer = np.isfinite(ways)
-    starts = np.vstack([inner, feeler_points[outer] + ways[outer, None] * feeler_normals[outer], known])
-    return _nearest_locus(geometry, signs, region, part, starts, spacing)
-
-
-def _nearest_locus(
-    geometry: object,
-    signs: object,
-    region: PlacedRegion,
-    part: int,
-    starts: NDArray[np.float64],
-    spacing: float,
-) -> LocusDistance:
-    if not len(starts):
-        return LocusDistance(math.inf, 0.0, None)
-    distances = _signed_distances(region, starts)
-    smallest = FINEST_STEP * spacing
-    fine, coarse = (
-        _best_slide(geometry, signs, region, part, starts, distances, stride, 0.5 * spacing, smallest)
-        for stride in (1, 2)
+    fine, coarse = _nearest_locus(
+        geometry,
+        signs,
+        region,
+        part,
+        determinants,
+        grid,
+        feeler_points,
+        feeler_normals,
+        known,
+        spacing,
+        limit,
     )
     best = min(fine, coarse)
     if not best[0] < math.inf:
         return LocusDistance(math.inf, 0.0, None)
-    pose = (float(best[1]), float(best[2]), float(best[3]))
     both = max(fine[0], coarse[0]) < math.inf
-    missed = abs(fine[0] - coarse[0]) if both else abs(float(best[0]))
-    return LocusDistance(float(best[0]), missed + ERROR_FLOOR * spacing, pose)
-
-
-def _lattice_crossings(values: NDArray[np.float64], grid: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Poses (N, 3) between lattice neighbours of opposite sign, by linear interpolation."""
-    found = [np.empty((0, 3))]
-    for axis in range(3):
-        count = values.shape[axis]
-        if count < 2:
-            continue
-        a, b = np.take(values, range(count - 1), axis), np.take(values, range(1, count), axis)
-        p, q = np.take(grid, range(count - 1), axis), np.take(grid, range(1, count), axis)
-        changed = (a > 0.0) != (b > 0.0)
-        share = (a[changed] / (a[changed] - b[changed]))[:, None]
-        found.append(p[changed] + share * (q[changed] - p[changed]))
-    return np.vstack(found)
+    missed = abs(fine[0] - coarse[0]) if both else abs(best[0])
+    return LocusDistance(best[0], missed + ERROR_FLOOR * spacing, best[1:])

@@ -1,6 +1,6 @@
 """Segments of rays that lie in one aspect: brackets on a few samples, ends polished.
 
-A ray is origin + t · scale · direction, t from 0 to its end. It is cut twice: where reach begins and ends,
+A ray is origin + t · step, t from 0 to its end. It is cut twice: where reach begins and ends,
 then where a determinant changes sides. Between the samples of all rays, all changes are polished together,
 so that margins are computed in vectorised rows.
 """
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.arithmetic import inner, kernel
+from tpm_design.arithmetic import inner
 from tpm_design.mechanisms.pointwise import reach_row, singularity_row
 
 REACH_SAMPLES = np.linspace(0.0, 1.0, 24)
@@ -179,7 +179,7 @@ def _sort(keys, rows, first, last):  # type: ignore[no-untyped-def]
             n -= 1
 
 
-@kernel
+@inner
 def _cut(geometry, mode, sided, part_count, floor, origin, steps, segments, shape, lowest):  # type: ignore[no-untyped-def]
     """Segments (ray, start, end) cut where a margin changes sides: the same and the code of what has at
     least the ``lowest`` code."""
@@ -232,29 +232,14 @@ def _cut(geometry, mode, sided, part_count, floor, origin, steps, segments, shap
     return ray[:found], start[:found], end[:found], codes[:found]
 
 
-def trace(
-    geometry: object,
-    signs: object,
-    *,
-    determinant_count: int,
-    sided: bool,
-    floor: float,
-    origin: tuple[float, float, float],
-    scale: tuple[float, float, float],
-    directions: NDArray[np.float64],
-    limits: NDArray[np.float64],
-) -> Segments:
-    """Segments of each ray in order along it.
-
-    ``sided``: cut where a determinant changes side or falls to ``floor``; otherwise reach alone.
-    ``limits`` (N,): ray parameters at which the rays end.
-    """
-    steps = directions * np.asarray(scale)
+@inner
+def traced(geometry, mode, sided, part_count, floor, origin, steps, limits):  # type: ignore[no-untyped-def]
+    """Segments (ray, start, end, code) of each ray in order along it; of rays that need not be cut at
+    singularities every code is 1. Arguments as of ``trace``, ``steps`` (N, 3): scale · direction."""
     whole = np.arange(limits.size), np.zeros(limits.size), limits
     # code 2 is within reach, code 1 outside
-    ray, start, end, code = _cut(geometry, signs, False, 1, 0.0, origin, steps, whole, REACH_SAMPLES, 2)
+    ray, start, end, code = _cut(geometry, mode, False, 1, 0.0, origin, steps, whole, REACH_SAMPLES, 2)
     if not sided:
-        return Segments(ray, start, end, np.ones_like(code))
-    reach = ray, start, end
-    cuts = _cut(geometry, signs, True, determinant_count, floor, origin, steps, reach, SIDE_SAMPLES, 1)
-    return Segments(*cuts)
+        code[:] = 1
+        return ray, start, end, code
+    return _cut(geometry, mode, True, part_count, floor, origin, steps, (ray, start, end), SIDE_SAMPLES, 1)

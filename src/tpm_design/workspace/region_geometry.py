@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.arithmetic import inner, kernel
+from tpm_design.arithmetic import inner, short_kernel
 from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere, Tilt
 
 BOX, CYLINDER, ELLIPSOID, POINTS = 0, 1, 2, 3
@@ -147,7 +147,7 @@ def nearest(region, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-@kernel
+@short_kernel
 def _nearest_at(region, x, y, z):  # type: ignore[no-untyped-def]
     return nearest(region, x, y, z)
 
@@ -195,7 +195,7 @@ def surface_frame(region, x, y, z):  # type: ignore[no-untyped-def]
     return axes
 
 
-@kernel
+@short_kernel
 def _signed_distance_at(region, x, y, z):  # type: ignore[no-untyped-def]
     return signed_distance(region, x, y, z)
 

@@ -18,17 +18,22 @@ def lattice(region: PlacedRegion, samples: int) -> FloatArray:
     each other in the array where they are in space. Points: (N, 1, 1, 3) as they are."""
     if region.form == POINTS:
         return region.points.reshape(-1, 1, 1, 3)
-    half = np.asarray(region.half)
+    return _lattice_about_centre(region.form, region.half, samples) + np.asarray(region.centre)
+
+
+@lru_cache(maxsize=16)
+def _lattice_about_centre(form: int, half_edges: tuple[float, float, float], samples: int) -> FloatArray:
+    half = np.asarray(half_edges)
     # odd, so that every second pose in order is a chequerboard
     counts = np.where(half > 0.0, 2 * np.rint(0.5 * samples * half / half.max()) + 1, 1).astype(int)
     counts = np.where(half > 0.0, np.maximum(3, np.minimum(counts, samples | 1)), 1)
-    edges = [np.linspace(-1.0, 1.0, count) if count > 1 else np.zeros(1) for count in counts]
-    unit = np.stack(np.meshgrid(*edges, indexing="ij"), axis=-1)
-    if region.form == CYLINDER:
+    ticks = [np.linspace(-1.0, 1.0, count) if count > 1 else np.zeros(1) for count in counts]
+    unit = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1)
+    if form == CYLINDER:
         unit[..., :2] = _to_ball(unit[..., :2])
-    elif region.form != BOX:
+    elif form != BOX:
         unit = _to_ball(unit)
-    return np.asarray(unit * half + np.asarray(region.centre))
+    return np.asarray(unit * half)
 
 
 def _to_ball(cube: FloatArray) -> FloatArray:
@@ -61,6 +66,7 @@ def feelers(region: PlacedRegion, samples: int) -> tuple[FloatArray, FloatArray]
     return centre + support / np.sqrt((support * normals).sum(axis=1, keepdims=True)), normals
 
 
+@lru_cache(maxsize=16)
 def _sphere(order: int) -> FloatArray:
     directions = ray_set(ALL_OCTANTS, order).directions
     return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))

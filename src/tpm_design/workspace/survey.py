@@ -6,6 +6,7 @@ within reach, crowded towards the coordinate planes and the bounds of reach, whe
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -14,10 +15,11 @@ from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.mechanisms.pointwise import singularity_row
 from tpm_design.workspace.aspects import mode_octants
 from tpm_design.workspace.directions import Octant
 from tpm_design.workspace.indices import determinant_at
-from tpm_design.workspace.rays import trace
+from tpm_design.workspace.rays import traced
 
 NEAREST_PLANE = 1e-7
 ALONG = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 13))
@@ -34,10 +36,18 @@ class Survey:
     determinants: NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class _RayGrids:
+    """``directions`` (N, 3), ``lengths`` (N,) their norms, ``neighbours`` (M, 2): rays next to each other."""
+
+    directions: NDArray[np.float64]
+    lengths: NDArray[np.float64]
+    neighbours: NDArray[np.int64]
+
+
 @lru_cache(maxsize=16)
-def _ray_grids(octants: tuple[Octant, ...], order: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Directions (N, 3), ``order``² in each of the three squares of an octant, edges included, and
-    neighbours (M, 2)."""
+def _ray_grids(octants: tuple[Octant, ...], order: int) -> _RayGrids:
+    """``order``² rays in each of the three squares of an octant, edges included."""
     u = np.maximum(NEAREST_PLANE, np.linspace(0.0, 1.0, order) ** 2)
     square = np.stack([np.ones((order, order)), *np.meshgrid(u, u, indexing="ij")], axis=-1).reshape(-1, 3)
     grid = np.arange(order * order).reshape(order, order)
@@ -47,44 +57,67 @@ def _ray_grids(octants: tuple[Octant, ...], order: int) -> tuple[NDArray[np.floa
             np.column_stack([grid[:, :-1].ravel(), grid[:, 1:].ravel()]),
         ]
     )
-    directions = [np.roll(square, axis, axis=1) * octant for octant in octants for axis in range(3)]
-    neighbours = [pairs + number * order * order for number in range(len(directions))]
-    return np.vstack(directions), np.vstack(neighbours)
+    squares = [np.roll(square, axis, axis=1) * octant for octant in octants for axis in range(3)]
+    neighbours = [pairs + number * order * order for number in range(len(squares))]
+    directions = np.vstack(squares)
+    return _RayGrids(directions, np.linalg.norm(directions, axis=1), np.vstack(neighbours))
+
+
+@inner
+def _part_pairs(rays, neighbours, count):  # type: ignore[no-untyped-def]
+    """The first part of each ray beside the first part of its neighbour, the second beside the second …"""
+    first = np.zeros(count + 1, np.int64)
+    for ray in rays:
+        first[ray + 1] += 1
+    for ray in range(count):
+        first[ray + 1] += first[ray]
+    size, most = 0, 0
+    for n in range(neighbours.shape[0]):
+        a, b = neighbours[n, 0], neighbours[n, 1]
+        both = min(first[a + 1] - first[a], first[b + 1] - first[b])
+        size += both
+        most = max(most, both)
+    pairs = np.empty((size, 2), np.int64)
+    size = 0
+    for number in range(most):
+        for n in range(neighbours.shape[0]):
+            a, b = neighbours[n, 0], neighbours[n, 1]
+            if number < min(first[a + 1] - first[a], first[b + 1] - first[b]):
+                pairs[size, 0], pairs[size, 1] = first[a] + number, first[b] + number
+                size += 1
+    return pairs
+
+
+@kernel
+def _surveyed(geometry, mode, part_count, directions, limits, neighbours):  # type: ignore[no-untyped-def]
+    """Poses, pairs and determinants of ``Survey``."""
+    rays, start, end, _ = traced(geometry, mode, False, part_count, 0.0, (0.0, 0.0, 0.0), directions, limits)
+    poses = np.empty((rays.size, ALONG.size, 3))
+    for s in range(rays.size):
+        for k in range(ALONG.size):
+            t = start[s] + (end[s] - start[s]) * ALONG[k]
+            for axis in range(3):
+                poses[s, k, axis] = t * directions[rays[s], axis]
+    table = poses.reshape(rays.size * ALONG.size, 3)
+    determinants = np.empty((part_count, table.shape[0]))
+    x, y, z = table[:, 0].copy(), table[:, 1].copy(), table[:, 2].copy()
+    singularity_row(geometry, mode, x, y, z, determinants)
+    for part in range(part_count):
+        for n in range(table.shape[0]):
+            if math.isnan(determinants[part, n]):
+                determinants[part, n] = 0.0
+    pairs = _part_pairs(rays, neighbours, directions.shape[0])
+    return poses, pairs, determinants.reshape(part_count, rays.size, ALONG.size)
 
 
 def survey(mechanism: Mechanism, mode: Mode, *, order: int) -> Survey:
     """The mode's workspace on ``order``² rays per square of an octant."""
-    directions, neighbours = _ray_grids(mode_octants(mode), order)
-    limits = mechanism.reach_radius() / np.linalg.norm(directions, axis=1)
-    parts = trace(
-        mechanism.geometry,
-        mode.signs,
-        determinant_count=len(mechanism.kind.determinants),
-        sided=False,
-        floor=0.0,
-        origin=(0.0, 0.0, 0.0),
-        scale=(1.0, 1.0, 1.0),
-        directions=directions,
-        limits=limits,
+    grids = _ray_grids(mode_octants(mode), order)
+    limits = mechanism.reach_radius() / grids.lengths
+    count = len(mechanism.kind.determinants)
+    return Survey(
+        *_surveyed(mechanism.geometry, mode.signs, count, grids.directions, limits, grids.neighbours)
     )
-    along = parts.start[:, None] + (parts.end - parts.start)[:, None] * ALONG
-    poses = along[:, :, None] * directions[parts.ray][:, None, :]
-    determinants = mechanism.determinants_at(poses.reshape(-1, 3), mode)
-    shape = (len(determinants), *along.shape)
-    return Survey(poses, _part_pairs(parts.ray, neighbours, len(directions)), determinants.reshape(shape))
-
-
-def _part_pairs(ray: NDArray[np.int64], neighbours: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """The first part of each ray beside the first part of its neighbour, the second beside the second …"""
-    first = np.searchsorted(ray, np.arange(count + 1))
-    parts = np.diff(first)
-    a, b = neighbours.T
-    both = np.minimum(parts[a], parts[b])
-    pairs = [
-        np.column_stack([first[a[both > number]] + number, first[b[both > number]] + number])
-        for number in range(int(both.max(initial=0)))
-    ]
-    return np.vstack([np.empty((0, 2), np.int64), *pairs])
 
 
 @inner

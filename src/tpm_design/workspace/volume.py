@@ -9,7 +9,7 @@ import numpy as np
 
 from tpm_design.errors import ParameterError, did_you_mean
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
-from tpm_design.workspace.aspects import RayField, mode_field
+from tpm_design.workspace.aspects import RayField, mode_fields
 
 VolumeKind = Literal["reachable", "singularity_free"]
 FINEST_ORDER = 96
@@ -68,10 +68,8 @@ def workspace_volume(
 def volume_at(mechanism: Mechanism, mode: Mode, kind: VolumeKind, margin: float, order: int) -> Volume:
     """The volume at one fixed resolution, smooth in the dimensions of the mechanism."""
     sided = kind == "singularity_free"
-    fine, coarse = (
-        selected_volume(mode_field(mechanism, mode, order=n, sided=sided, floor=margin), sided)
-        for n in (order, coarser(order))
-    )
+    fields = mode_fields(mechanism, mode, orders=(order, coarser(order)), sided=sided, floor=margin)
+    fine, coarse = (selected_volume(field, sided) for field in fields)
     return Volume(fine, abs(fine - coarse))
 
 
