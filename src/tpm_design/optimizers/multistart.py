@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer, Outcomes, Search
-from tpm_design.optimizers.descent import Landing, descend
+from tpm_design.optimizers.descent import BLURRED, SHARP, Landing, descend
 from tpm_design.optimizers.levels import descend_levels
 from tpm_design.optimizers.places import Place, looked_at, places
 from tpm_design.optimizers.starts import Starts, choice_of
@@ -30,13 +30,16 @@ COARSE = 1e-4
 
 COARSE_STEPS = 60
 
-POLISH_RADII = (0.03, 0.003)
-"""First trust regions of the local searches that begin again at the best optimum."""
+POLISH = ((0.1, BLURRED), (0.03, SHARP), (0.003, SHARP))
+"""First trust region and differences of the searches that begin again where the best one ended, in turn."""
 
-HOP_STARTS = 3
+AGAIN = 0.03
+"""First trust region of a search that goes on from the best place that another one saw."""
+
+HOP_STARTS = 2
 """A search from near the best optimum follows each of so many from the sample."""
 
-HOPS = (0.05, 0.2)
+HOPS = (0.1, 0.2)
 """Standard deviations, as shares of each range, by which the best optimum is perturbed for a new start."""
 
 SAME = 0.01
@@ -174,30 +177,33 @@ class _Course:
                 self._hops += 1
                 return self._hop(best)
         self._begun += 1
-        return self._from_sample(self._starts.next([optimum.place.point for optimum in self._optima]))
+        ordered = sorted(self._optima, key=lambda optimum: optimum.place.objective)
+        return self._from_sample(self._starts.next([optimum.place.point for optimum in ordered]))
 
     def _from_sample(self, sample: Place) -> Task:
         start = yield from looked_at(sample.point)
-        landing = yield from self._descended(start, RADIUS)
+        landing = yield from self._descended(start, RADIUS, SHARP)
         self._ended += 1
         yield from self._arrived(landing, independent=True)
 
     def _from_left(self, left: Place) -> Task:
-        """From the best place that a search saw, where that is better than any optimum: it went elsewhere."""
+        """From the best place that a search saw, where it went elsewhere and found nothing better."""
         start = yield from looked_at(left.point)
-        landing = yield from self._descended(start, POLISH_RADII[0])
+        landing = yield from self._descended(start, AGAIN, SHARP)
         yield from self._arrived(landing, independent=False)
 
     def _hop(self, best: Optimum) -> Task:
-        sigma = HOPS[self._hops // 2 % len(HOPS)]
+        sigma = HOPS[self._hops % len(HOPS)]
         point = best.place.point.copy()
         point[self._free] += sigma * self._random.standard_normal(len(self._free))
         start = yield from looked_at(np.clip(point, 0.0, 1.0))
-        landing = yield from self._descended(start, 0.5 * RADIUS)
+        landing = yield from self._descended(start, 0.5 * RADIUS, BLURRED)
         yield from self._arrived(landing, independent=False)
 
-    def _descended(self, start: Place, radius: float) -> Generator[FloatArray, Outcomes, Landing]:
-        landing = yield from descend(start, self._free, radius, self._known, COARSE, COARSE_STEPS)
+    def _descended(
+        self, start: Place, radius: float, blur: float
+    ) -> Generator[FloatArray, Outcomes, Landing]:
+        landing = yield from descend(start, self._free, radius, self._known, COARSE, COARSE_STEPS, blur)
         if not len(self._free):
             landing = yield from descend_levels(landing, self._levels)
         return landing
@@ -206,8 +212,8 @@ class _Course:
         """Polish an optimum, then try its neighbours in the discrete variables."""
         self._finishing = True
         landing = best.landing
-        for radius in POLISH_RADII if len(self._free) else ():
-            further = yield from descend(landing.place, self._free, radius)
+        for radius, blur in POLISH if len(self._free) else ():
+            further = yield from descend(landing.place, self._free, radius, blur=blur)
             if not landing.place.improves(further.place):
                 landing = further
         best.landing, best.finished = landing, True
