@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
 import threading
 import time
@@ -16,7 +15,7 @@ from pathlib import Path
 from row import Row
 from tpm_design.metrics import metric
 from tpm_design.problem import Goal, Problem
-from tpm_design.runs.executors import SWITCH_INTERVAL, Executor, Threads
+from tpm_design.runs.executors import Executor, Threads
 from tpm_design.runs.folder import RunWriter
 from tpm_design.runs.optimize import SearchPlan, search
 from tpm_design.runs.sweeps import Point, sweep
@@ -26,7 +25,7 @@ from tpm_design.study.sweep_points import sweep_points
 STUDY = Path(__file__).resolve().parents[1] / "studies" / "01-uru-cube.yaml"
 POINTS, LEAST_MILLISECONDS = 120, 8.0
 BUDGET = 1000
-WORKERS, ROUNDS = (1, 2, 4), 5
+WORKERS, ROUNDS = (1, 2, 4), 3
 TARGET = 1.7
 
 Run = Callable[[Executor], int]
@@ -129,7 +128,6 @@ def compared(name: str, run: Run) -> list[Row]:
 
 
 def rows() -> list[Row]:
-    sys.setswitchinterval(SWITCH_INTERVAL)
     problem, points = slow_points()
     study = replace(load_study(STUDY), certification=None)
     runs: list[tuple[str, Run]] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import closing
@@ -20,7 +21,7 @@ from tpm_design.errors import RefusedError, RunStoppedError
 from tpm_design.mechanisms import MECHANISMS
 from tpm_design.problem import Problem, evaluate
 from tpm_design.runs.dask_workers import CHUNK_SECONDS, HANDLING_SECONDS, DaskWorkers
-from tpm_design.runs.executors import AHEAD, Threads, in_order
+from tpm_design.runs.executors import AHEAD, SWITCH_INTERVAL, Threads, in_order
 from tpm_design.runs.shipping import carried_out, packed, portable, unpacked
 from tpm_design.study import load_comparison, load_study
 from tpm_design.study.design import choose_design
@@ -51,6 +52,19 @@ def test_threads_give_every_result_and_drop_what_was_not_begun(problem: Problem)
         assert len(begun) <= 20 + 2 * AHEAD
         found = list(pool.as_they_end(task, problem, range(100)))
     assert sorted(found) == [(place, place * place) for place in range(100)]
+
+
+def test_threads_share_the_interpreter_often_until_they_are_closed() -> None:
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(0.004)
+    try:
+        with closing(Threads(2)):
+            assert sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL)
+        assert sys.getswitchinterval() == pytest.approx(0.004)
+        with closing(Threads(1)):
+            assert sys.getswitchinterval() == pytest.approx(0.004)
+    finally:
+        sys.setswitchinterval(before)
 
 
 def test_what_a_task_raises_reaches_whoever_asks(problem: Problem) -> None:

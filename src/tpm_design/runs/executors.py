@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Protocol, TypeVar
@@ -40,11 +41,15 @@ class Executor(Protocol):
 
 
 class Threads:
-    """Threads of this process; with one worker the thread that asks."""
+    """Threads of this process; with one worker the thread that asks. Until they are closed, they let one
+    another have the interpreter after ``SWITCH_INTERVAL``."""
 
     def __init__(self, workers: int) -> None:
         self._workers = workers
         self._pool = ThreadPoolExecutor(max_workers=workers) if workers > 1 else None
+        self._interval_before = sys.getswitchinterval()
+        if workers > 1:
+            sys.setswitchinterval(min(SWITCH_INTERVAL, self._interval_before))
 
     @property
     def workers(self) -> int:
@@ -76,6 +81,7 @@ class Threads:
         """As ``Executor``."""
         if self._pool is not None:
             self._pool.shutdown(wait=True, cancel_futures=True)
+            sys.setswitchinterval(self._interval_before)
 
 
 def _ended(places: dict[Future[Result], int]) -> Iterator[tuple[int, Result]]:
