@@ -28,7 +28,8 @@ RADIUS = 0.2
 COARSE = 1e-4
 """Trust region at which such a search has come near enough to an optimum; the best ones are finished."""
 
-COARSE_STEPS = 60
+COARSE_STEPS = 30
+"""After so many steps it ends in any case: those that take longer seldom lead anywhere."""
 
 POLISH = ((0.1, BLURRED), (0.03, SHARP), (0.003, SHARP))
 """First trust region and differences of the searches that begin again where the best one ended, in turn."""
@@ -39,8 +40,8 @@ AGAIN = 0.03
 HOP_STARTS = 2
 """A search from near the best optimum follows each of so many from the sample."""
 
-HOPS = (0.1, 0.2)
-"""Standard deviations, as shares of each range, by which the best optimum is perturbed for a new start."""
+HOPS = (0.17, 0.35)
+"""Distances, as shares of the ranges, by which the best optimum is perturbed for a new start."""
 
 SAME = 0.01
 """Optima of the same discrete choice that are nearer than this in every coordinate of the cube are one."""
@@ -193,7 +194,7 @@ class _Course:
         yield from self._arrived(landing, independent=False)
 
     def _hop(self, best: Optimum) -> Task:
-        sigma = HOPS[self._hops % len(HOPS)]
+        sigma = HOPS[self._hops % len(HOPS)] / max(1, len(self._free)) ** 0.5
         point = best.place.point.copy()
         point[self._free] += sigma * self._random.standard_normal(len(self._free))
         start = yield from looked_at(np.clip(point, 0.0, 1.0))
