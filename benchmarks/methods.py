@@ -23,7 +23,7 @@ import numpy as np
 
 from known_optima import KnownOptimum, known_optima
 from tpm_design.design_space import DesignSpace, octant_signs
-from tpm_design.optimizers import OPTIMIZERS
+from tpm_design.optimizers import OPTIMIZERS, default_method
 from tpm_design.problem import Evaluation, Problem, evaluate
 from tpm_design.runs.optimize import SearchPlan, search
 from tpm_design.runs.search import minimised, outcomes
@@ -55,8 +55,7 @@ def ours(problem: Problem, method: str, polish: str | None, budget: int, seed: i
 
 def by_default(problem: Problem, budget: int, seed: int) -> Sequence[Evaluation]:
     """What a study without ``optimizer:`` gets."""
-    model = OptimizerModel()
-    return ours(problem, model.method, model.polish, budget, seed)
+    return ours(problem, default_method(1), OptimizerModel().polish, budget, seed)
 
 
 def space_of(problem: Problem) -> DesignSpace:
@@ -130,7 +129,7 @@ def methods() -> dict[str, Callable[[Problem, int, int], Sequence[Evaluation]]]:
     able = {
         name: of_package(name)
         for name, method in OPTIMIZERS.items()
-        if method.abilities.whole_space and not method.abilities.relaxation
+        if method.abilities.whole_space and not (method.abilities.relaxation or method.abilities.front)
     }
     return {
         DEFAULT: by_default,

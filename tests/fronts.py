@@ -57,6 +57,9 @@ class FrontMemo:
     def objective_count(self) -> int:
         return self.case.objectives
 
+    def in_pieces(self) -> FrontMemo:
+        return self
+
     def evaluate(self, points: FloatArray) -> Outcomes:
         self.after_end += self.spent
         assert points.shape[1] == self.dimension
@@ -66,7 +69,9 @@ class FrontMemo:
         self.batches.append(len(self.log) - paid)
         objectives = np.array([values for values, _ in results]).reshape(len(points), -1)
         constraints = np.array([slack for _, slack in results]).reshape(len(points), self.case.constraints)
-        return Outcomes(objectives[:, 0], constraints, objectives[:, 0], objectives)
+        pieces = tuple(column[:, None] for column in objectives.T)
+        first = objectives[:, 0]
+        return Outcomes(first, constraints, first, objectives=objectives, objective_pieces=pieces)
 
     def _value(self, point: FloatArray) -> Values:
         design = point.copy()

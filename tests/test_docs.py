@@ -13,6 +13,7 @@ import typer
 import tpm_design as tpm
 from tpm_design.cli.app import app
 from tpm_design.cli.catalogue import show_thing
+from tpm_design.cli.inscribe import inscribe_one
 from tpm_design.mechanisms import MECHANISMS
 from tpm_design.metrics import METRICS
 from tpm_design.optimizers import OPTIMIZERS
@@ -181,7 +182,7 @@ def test_the_python_example_runs() -> None:
 
 def test_the_numbers_shown_are_those_of_the_design_shown() -> None:
     """To the digits of the table; the design itself is given to six."""
-    shown, _ = blocks("text")
+    shown = blocks("text")[0]
     rows = {line.split()[0]: line.split()[1:] for line in shown.splitlines() if line.strip()}
     design = {
         name: float(rows[name][0]) / 1000.0
@@ -192,6 +193,25 @@ def test_the_numbers_shown_are_those_of_the_design_shown() -> None:
     for label, value in found.metrics.items():
         scale = 1000.0 if rows[label][1] == "mm" else 1.0
         assert scale * value == pytest.approx(float(rows[label][0]), rel=1e-3)
+
+
+def test_the_largest_body_shown_is_that_of_the_design_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """To five digits; the design itself is given to six."""
+    design, _, body = blocks("text")
+    rows = [line.split() for line in design.splitlines()[2:] if line.strip()]
+    settings = [f"{row[0]}={row[1]}" for row in rows if row[0] in ("db", "f", "r", "k")]
+    inscribe_one(
+        ROOT / "studies" / "01-uru-cube.yaml", settings, "box", 0.1, None, True, tmp_path / "body.json", 1,
+        allow_code=False, as_json=False, quiet=True,
+    )  # fmt: skip
+    now = capsys.readouterr().out
+    for shown in ("size x", "size y", "size z", "volume", "reach", "translation", "actuation", "rotation"):
+        was, found = (re.search(rf"^{shown} +(\S+)", text, re.MULTILINE) for text in (body, now))
+        assert was is not None and found is not None
+        assert float(found[1]) == pytest.approx(float(was[1]), rel=2e-5)
+    assert "Proved at every pose of the body" in now
 
 
 def test_names_in_code_are_registered() -> None:

@@ -41,7 +41,8 @@ def is_random(method: Optimizer) -> bool:
 def test_the_methods_there_are() -> None:
     found = {name for name, method in OPTIMIZERS.items() if method.abilities.front}
     assert found == {"pymoo.nsga2", "pymoo.nsga3", "nlopt.epsilon_constraint"}
-    assert (default_method(1), default_method(2)) == ("scipy.differential_evolution", "pymoo.nsga2")
+    assert (default_method(2), default_method(3)) == ("pymoo.nsga2", "pymoo.nsga2")
+    assert not optimizer(default_method(1)).abilities.front
 
 
 # ------------------------------------------------------------------------------------- known fronts
@@ -115,15 +116,9 @@ def test_the_ladder_ends_by_itself_and_leaves_no_wide_gap() -> None:
     assert said.startswith("The ladder of bounds is complete")
     assert not search.spent
     assert np.abs(np.diff(front, axis=0)).max() <= 0.06
-    assert np.sqrt(front).sum(axis=1).max() <= 1.02
-
-
-def test_the_ladder_reaches_each_bound_with_the_least_of_the_first_objective() -> None:
-    """Not near the front but on it: at every rung f₁ = (1 − √f₂)²."""
-    search = FrontMemo(CONVEX, 10**5)
-    optimizer("nlopt.epsilon_constraint").run(search, 1)
-    front, _ = search.front()
+    # not near the front but on it: at every rung f₁ = (1 − √f₂)²
     missed = np.sqrt(front).sum(axis=1) - 1.0
+    assert missed.max() <= 0.02
     assert np.mean(missed <= 1e-4) >= 0.5
 
 

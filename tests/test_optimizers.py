@@ -195,7 +195,14 @@ def is_local(method: Optimizer) -> bool:
 
 def test_the_registry_holds_every_method_under_its_name() -> None:
     assert all(name == method.name for name, method in OPTIMIZERS.items())
-    assert {name.split(".")[0] for name in OPTIMIZERS} == {"multistart", "scipy", "nlopt", "convex", "pymoo"}
+    assert {name.split(".")[0] for name in OPTIMIZERS} == {
+        "multistart",
+        "descent",
+        "scipy",
+        "nlopt",
+        "convex",
+        "pymoo",
+    }
     assert all(method.description and method.source for method in OPTIMIZERS.values())
 
 

@@ -236,3 +236,37 @@ def test_designs_that_fail_are_counted_with_their_reason(links: Problem) -> None
     result = run(replace(links, variables=hopeless), SearchPlan("nlopt.isres", 10, 1, None), workers=1)
     assert "None of 10 designs could be evaluated: " in result.status
     assert result.status.endswith("not positive. Change the ranges.")
+
+
+# ------------------------------------------------------------------------------------- several objectives
+
+
+def test_pieces_of_objectives_have_the_objective_as_their_greatest(cube: Problem) -> None:
+    """Less is better of both: the pieces of a least value that is to be large are its negatives."""
+    goals = {goal.label: goal for goal in cube.constraints}
+    even = replace(goals["conditioning_min"], minimum=None, sense="maximize")
+    problem = replace(
+        cube,
+        objectives=(*cube.objectives, even),
+        constraints=(goals["coverage"],),
+        accuracy=Accuracy(1e-3, 3),
+    )
+    space = DesignSpace(problem.variables, problem.fixed, octant_signs(problem.modes))
+    view = UnitSearch(EvaluationLog(problem, workers=1), space, space.start(), 100, (1,))
+    middle = dict.fromkeys(("center_x", "center_y", "center_z"), 0.155)
+    serving = space.point({**problem.fixed, "db": 0.19, "f": 0.23, "r": 0.19, "k": 1.0, **middle})
+    rng = np.random.default_rng(4)
+    points = np.vstack(
+        [serving, np.clip(serving + 0.03 * rng.standard_normal((30, view.dimension)), 0.0, 1.0)]
+    )
+    plain = view.evaluate(points)
+    pieces = view.in_pieces().evaluate(points)
+    assert [values.shape[1] for values in plain.objective_pieces] == [1, 1]
+    assert [values.shape[1] for values in pieces.objective_pieces] == [1, 8]
+    assert pieces.constraints.shape[1] == 32
+    for found in (plain, pieces):
+        assert np.array_equal(found.objectives, plain.objectives)
+        for column, values in zip(found.objectives.T, found.objective_pieces, strict=True):
+            assert np.array_equal(values.max(axis=1), column)
+    assert np.ptp(pieces.objective_pieces[1], axis=1).max() > 0.01
+    assert len(view.log.entries) == len(points)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +29,7 @@ from tpm_design.report.readings import at_end
 from tpm_design.report.words import range_text
 from tpm_design.study import choose_design
 from tpm_design.study.plain import dump_yaml
+from tpm_design.study.schema import study_schema
 from tpm_design.study.study import Study
 from tpm_design.study.sweep_points import sweep_points
 from tpm_design.study.template import template
@@ -318,3 +320,14 @@ def test_the_commented_study_names_both_forms() -> None:
     text = template("mine", tpm.mechanisms.MECHANISMS["uru"])
     assert "{ratio: f, min:" in text
     assert "scale: log" in text
+
+
+def test_the_schema_knows_both_forms(study: Study) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    validator = jsonschema.Draft202012Validator(study_schema())
+    data = study.resolved()
+    assert validator.is_valid(data)
+    for key, value in (("scale", "ln"), ("ratio", 2), ("values", [1])):
+        wrong = json.loads(json.dumps(data))
+        wrong["mechanism"]["parameters"]["dp"][key] = value
+        assert not validator.is_valid(wrong)

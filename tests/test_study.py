@@ -186,7 +186,7 @@ def test_the_order_and_style_of_the_file_change_nothing(tmp_path: Path) -> None:
 def test_defaults_are_written_out(tmp_path: Path) -> None:
     cut = GOOD.index("optimizer:")
     resolved = load_study(written(tmp_path, GOOD[:cut])).resolved()
-    assert resolved["optimizer"] == {"method": "scipy.differential_evolution", "budget": 2000, "seed": 1}
+    assert resolved["optimizer"] == {"method": "multistart", "budget": 2000, "seed": 1}
     assert resolved["accuracy"] == {"volume": 1e-3, "region_samples": 9}
 
 

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from tpm_design.mechanisms import mechanism as mechanism
     from tpm_design.study import Study as Study
     from tpm_design.study import load_study as load_study
+    from tpm_design.synthesis.inscribed import InscribedBody as InscribedBody
+    from tpm_design.synthesis.inscribed import largest_body as largest_body
     from tpm_design.workspace.certified_volume import CertifiedVolume as CertifiedVolume
     from tpm_design.workspace.certified_volume import certified_volume as certified_volume
     from tpm_design.workspace.volume import Volume as Volume
@@ -23,16 +25,20 @@ _HOMES = {
     "Volume": "tpm_design.workspace.volume",
     "certified_volume": "tpm_design.workspace.certified_volume",
     "CertifiedVolume": "tpm_design.workspace.certified_volume",
+    "largest_body": "tpm_design.synthesis.inscribed",
+    "InscribedBody": "tpm_design.synthesis.inscribed",
     "load_study": "tpm_design.study",
     "Study": "tpm_design.study",
 }
 
 __all__ = [
     "CertifiedVolume",
+    "InscribedBody",
     "Study",
     "Volume",
     "__version__",
     "certified_volume",
+    "largest_body",
     "load_study",
     "mechanism",
     "workspace_volume",

@@ -113,7 +113,8 @@ class Cutoff:
 class Evaluation:
     """One evaluated design, SI units. ``slacks``: constraint label → signed distance to its bound, the
     least of its ``pieces``: one number, or a fixed number of them, smoother in the design; those of the
-    problem's samples included.
+    problem's samples included. Of several objectives ``pieces`` has the values of which each is the least or
+    the greatest, none where it is one by itself.
 
     "aborted": found to be worse than ``cutoff`` before everything was measured. What was not measured is
     missing; ``violation`` is what it is at least.
@@ -220,6 +221,13 @@ def _slack_pieces(
     }
 
 
+def _objective_pieces(problem: Problem, measured: Mapping[str, Measurement]) -> dict[str, tuple[float, ...]]:
+    """Of each of several objectives that was measured: a search for a front bounds objectives too."""
+    if len(problem.objectives) == 1:
+        return {}
+    return {g.label: measured[g.label].pieces for g in problem.objectives if g.label in measured}
+
+
 def _shortfalls(
     problem: Problem, measured: Mapping[str, Measurement], sampled: Mapping[str, tuple[float, ...]]
 ) -> dict[str, float]:
@@ -262,7 +270,7 @@ def _judged(
         metrics={label: m.value for label, m in found.items()},
         errors={label: m.error for label, m in found.items()},
         slacks={label: min(values) for label, values in pieces.items()},
-        pieces=pieces,
+        pieces={**pieces, **_objective_pieces(problem, measured)},
         notes={
             f"{label}_{key}": note
             for label, m in found.items()

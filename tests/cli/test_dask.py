@@ -37,6 +37,11 @@ GRID = (
 LONG = POLISHED.replace("budget: 160, seed: 1, polish: nlopt.cobyla", "budget: 100000, seed: 1")
 LONG = LONG.replace("{values: [1, 2]}", "{min: 1, max: 2}")
 
+# evaluations are aborted as soon as they are known to be worse than others
+SCREENED = POLISHED.replace("scipy.differential_evolution", "multistart").replace(
+    ", polish: nlopt.cobyla", ""
+)
+
 pytestmark = [
     pytest.mark.skipif(os.name == "nt", reason="processes are killed otherwise there"),
     pytest.mark.xdist_group("dask"),
@@ -56,7 +61,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 # ---------------------------------------------------------------------------------------- the same files
 
 
-@pytest.mark.parametrize("text", [POLISHED, CERTIFIED], ids=["polished", "certified"])
+@pytest.mark.parametrize("text", [POLISHED, CERTIFIED, SCREENED], ids=["polished", "certified", "screened"])
 def test_a_search_is_the_same_on_any_number_of_workers(text: str, address: str, tmp_path: Path) -> None:
     study = written(tmp_path, text)
     runs = []

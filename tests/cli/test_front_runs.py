@@ -14,7 +14,11 @@ from command_line import tpm_design, written
 
 import tpm_design as tpm
 from tpm_design.errors import RefusedError
+from tpm_design.optimizers import default_method
 from tpm_design.problem import Problem
+from tpm_design.report.convergence import convergence_figure
+from tpm_design.report.front_figures import front_figure
+from tpm_design.report.reported import read_reported
 from tpm_design.runs.folder import entry_to_json, read_run
 from tpm_design.runs.front import extremes, knee, non_dominated
 from tpm_design.runs.optimize import SearchPlan, search
@@ -80,7 +84,7 @@ def test_a_study_of_several_objectives_that_names_no_method_is_searched_by_nsga2
     assert study.optimizer.method == study.resolved()["optimizer"]["method"] == "pymoo.nsga2"
     (first, _) = FRONT.split("  - {metric: conditioning_min")
     one = loaded(tmp_path, first + FRONT[FRONT.index("constraints:") :])
-    assert one.optimizer.method == "scipy.differential_evolution"
+    assert one.optimizer.method == default_method(1)
 
 
 def test_designs_csv_holds_the_front_of_the_whole_log(run: Path) -> None:
@@ -146,9 +150,9 @@ def test_where_nothing_is_feasible_the_closest_design_is_the_result(tmp_path: Pa
     assert float(row["violation [-]"]) == min(e.evaluation.violation for e in entries)
     assert row["mark"] == ""
     assert "the closest misses singularity_margin_min" in outcome.output
-    assert tpm_design("report", run).code == 0
-    assert not (run / "figures" / "front.png").exists()
-    assert (run / "figures" / "convergence.png").exists()
+    reported = read_reported(run)
+    assert front_figure(reported) is None
+    assert convergence_figure(reported) is not None
 
 
 # -------------------------------------------------------------------------------- other commands
@@ -312,8 +316,8 @@ def test_no_search_of_its_own_improves_a_design_of_the_ladder(tmp_path: Path) ->
     """Differential evolution and a polish, which know nothing of the front, find links shorter by at most
     0.2 %."""
     study = loaded(tmp_path, with_method("nlopt.epsilon_constraint"))
-    front = study.optimize(budget=2500).result.front
+    front = study.optimize(budget=1500).result.front
     values = np.array([scaled_objectives(study.problem, entry.evaluation) for entry in front])
-    at = np.unique(np.linspace(0, len(front) - 1, 5).astype(int))
+    at = np.unique(np.linspace(0, len(front) - 1, 4).astype(int))
     for row in {*at.tolist(), knee(values)}:
         assert not_longer(study.problem, front[row], seed=1) <= 2e-3

@@ -43,6 +43,7 @@ NEEDS_ASKING = (
     ("evaluate", "study.yaml"),
     ("optimize", "study.yaml"),
     ("certify", "study.yaml"),
+    ("inscribe", "study.yaml", "--body", "box"),
     ("report", "run"),
 )
 
@@ -140,8 +141,8 @@ def test_no_command_runs_the_file_unasked(command: Command, run_folder: Path, tm
     folder = written(tmp_path / "stranger", trap)
     run = written(tmp_path / "stranger" / "run", trap)
     (run / "evaluations.jsonl").write_bytes((run_folder / "evaluations.jsonl").read_bytes())
-    for name, place in NEEDS_ASKING:
-        refused = tpm_design(name, folder / place)
+    for name, place, *options in NEEDS_ASKING:
+        refused = tpm_design(name, folder / place, *options)
         assert (refused.code, refused.output) == (2, "")
         assert "study.yaml:5: the mechanism is a Python file, 'gantry.py'" in refused.errors
         assert "--allow-code" in refused.errors

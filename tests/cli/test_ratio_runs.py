@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from pathlib import Path
 
 import pytest
 from command_line import STUDY, tpm_design, written
 
+from tpm_design.report.reported import read_reported
+from tpm_design.report.sweep_figures import map_figure, scatter_figure
 from tpm_design.runs.folder import entry_to_json, read_run
 
 SHARES = STUDY
@@ -97,3 +100,22 @@ def test_a_report_tells_the_ranges(folder: Path) -> None:
     text = (run / "report.md").read_text(encoding="utf-8").replace("\\", "")
     assert "0.2 … 0.9 × f" in text
     assert "0.1 … 1 × db, log scale" in text
+
+
+def test_a_sweep_over_a_log_range_is_drawn_on_a_log_scale(tmp_path: Path) -> None:
+    plan = "sweep: {type: grid, parameters: {f: {num: 5}, k: {values: [1, 2]}}}\n"
+    study = written(tmp_path, SHARES + plan)
+    assert tpm_design("sweep", study, "--output", tmp_path, "--quiet").code in (0, 3)
+    (run,) = (tmp_path / "shares").iterdir()
+    with (run / "designs.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    lengths = [float(row["f [mm]"]) for row in rows[::2]]
+    assert lengths == pytest.approx([100.0 * 5.0 ** (step / 4) for step in range(5)], rel=1e-11)
+    for row in rows:
+        assert float(row["db [mm]"]) == pytest.approx(0.55 * float(row["f [mm]"]), rel=1e-14)
+        assert float(row["dp [mm]"]) == pytest.approx(math.sqrt(0.1) * float(row["db [mm]"]), rel=1e-14)
+    reported = read_reported(run)
+    for figure in (scatter_figure(reported), map_figure(reported)):
+        assert figure is not None
+        assert {axes.get_xscale() for axes in figure.axes if axes.get_xlabel() == "f [mm]"} == {"log"}
+        assert all(axes.get_xscale() == "linear" for axes in figure.axes if axes.get_xlabel() == "k")

@@ -243,7 +243,11 @@ OBJECTIVE = "  - {metric: total_link_length, sense: minimize}\n"
         ("scipy.differential_evolution", "scipy.slsqp", "discrete here: k"),
         ("scipy.differential_evolution", "nlopt.mma", "discrete here: k"),
         ("seed: 1", "seed: 1, polish: nlopt.isres", "not a local method"),
-        (OBJECTIVE, OBJECTIVE + "  - {metric: robot_size, sense: minimize}\n", "2 objectives"),
+        (
+            OBJECTIVE,
+            OBJECTIVE + "  - {metric: robot_size, sense: minimize}\n",
+            "takes one objective; this study has 2",
+        ),
         ("scipy.differential_evolution", "scipy.diferential_evolution", "'scipy.differential_evolution'"),
     ],
 )

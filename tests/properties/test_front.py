@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tpm_design.runs.front import FloatArray, FrontBox, extremes, front_box, knee, non_dominated
+from tpm_design.runs.front import FloatArray, FrontBox, extended, extremes, front_box, knee, non_dominated
 
 # few values, so that there are ties and equal rows
 TABLES = st.tuples(st.integers(1, 30), st.integers(2, 4)).flatmap(
@@ -43,6 +43,15 @@ def test_the_front_of_a_front_is_itself_and_more_rows_only_push_it(table: FloatA
     part = table[: len(table) // 2 + 1]
     for row in part[non_dominated(part)]:
         assert any(np.all(other <= row) for other in front)
+
+
+@given(TABLES)
+@settings(max_examples=100, deadline=None)
+def test_a_front_grows_row_by_row_to_the_same(table: FloatArray) -> None:
+    front = np.empty((0, table.shape[1]))
+    for row in table:
+        front = extended(front, row)
+    assert sorted(map(tuple, front + 0.0)) == sorted(map(tuple, table[non_dominated(table)] + 0.0))
 
 
 @given(TABLES)

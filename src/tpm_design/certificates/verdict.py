@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tpm_design.arithmetic.rounding import check_rounding
 from tpm_design.certificates.demands import REACH, Demand, NoProofError, demands, refutable
@@ -65,9 +65,11 @@ def verdict(
     boxes: int,
     workers: int = 1,
     with_slack: bool = True,
+    least_determinant: float = 0.0,
 ) -> Verdict:
     """Settle every constraint of the problem for all machines within ``tolerance`` (name → ±, SI, each limb
     by itself), with at most ``boxes`` boxes for each proof. The result is the same for any number of workers.
+    Determinants whose sides matter must keep ``least_determinant`` from 0.
 
     Raises ParameterError where the design cannot be built, or a tolerance is not smaller than what it is on.
     """
@@ -75,7 +77,7 @@ def verdict(
     check_rounding()
     context = design_context(problem, design)
     check_tolerances(context.mechanism, tolerance)
-    needs = [_needs(goal, context) for goal in problem.constraints]
+    needs = [_needs(goal, context, least_determinant) for goal in problem.constraints]
     # each statement once, however many requirements need it
     distinct = list(dict.fromkeys(demand for need in needs if not isinstance(need, str) for demand in need))
     if context.region is not None and distinct:
@@ -125,16 +127,22 @@ def worst_outcome(outcomes: list[Outcome]) -> Outcome:
     return "undecided" if "undecided" in outcomes else "proved"
 
 
-def _needs(goal: Goal, context: Context) -> tuple[Demand, ...] | str:
+def _needs(goal: Goal, context: Context, least_determinant: float) -> tuple[Demand, ...] | str:
     kind = context.mechanism.kind
     placed = context.region
     if goal.metric.name == "coverage" and placed is not None and len(placed.points) > 1:
         return "that separate poses lie in one aspect has no proof here"
     signs = (1.0,) * len(kind.determinants) if context.region is None else context.lattice_sides
     try:
-        return demands(goal, kind, signs)
+        needed = demands(goal, kind, signs)
     except NoProofError as reason:
         return str(reason)
+    return tuple(
+        replace(demand, bound=max(demand.bound, least_determinant))
+        if demand.kind == "determinant"
+        else demand
+        for demand in needed
+    )
 
 
 def _requirement(goal: Goal, numbers: list[int], settlements: tuple[Settlement, ...]) -> Requirement:

@@ -290,6 +290,54 @@ def certify(
 
 @app.command()
 @guarded
+def inscribe(
+    study: Annotated[Path, typer.Argument(metavar="STUDY|RUN", help="Study file or run folder.")],
+    body: Annotated[str, typer.Option(help="box, sphere, cylinder (axis along z) or ellipsoid.")],
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Value in the study's units; may be repeated."),
+    ] = None,
+    margin: Annotated[
+        float, typer.Option(help="Least distance of every determinant from 0, dimensionless.")
+    ] = 0.0,
+    proportions: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="Proportions of the sizes along x, y and z; free if left out."),
+    ] = None,
+    certify: Annotated[
+        bool, typer.Option("--certify", help="Shrink it until it is proved; writes a certificate.")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The certificate, instead of ./certificate.json.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Threads of the proof; one per processor if left out.")
+    ] = None,
+    allow_code: AllowCode = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int | None:
+    """Find the largest body in the singularity-free region of one design: within reach and joint limits of
+    the mode, in any of its aspects. The study's own region and constraints play no part."""
+    from tpm_design.cli.inscribe import inscribe_one
+
+    return inscribe_one(
+        study,
+        settings or [],
+        body,
+        margin,
+        proportions,
+        certify,
+        output,
+        workers,
+        allow_code=allow_code,
+        as_json=as_json,
+        quiet=quiet,
+    )
+
+
+@app.command()
+@guarded
 def report(
     runs: Annotated[
         list[Path] | None, typer.Argument(metavar="[RUN ...]", help="Run folders; the newest if left out.")

@@ -7,8 +7,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import numpy as np
+
 from tpm_design.problem import Problem
-from tpm_design.runs.search import Entry, front_entries, minimised
+from tpm_design.runs.front import extended
+from tpm_design.runs.search import Entry, minimised, scaled_objectives
 from tpm_design.runs.tables import goal_unit
 from tpm_design.units import Units
 
@@ -58,7 +61,7 @@ class _Best:
     def __init__(self, problem: Problem, units: Units) -> None:
         self._problem, self._units = problem, units
         self._goal = problem.objectives[0]
-        self._front: list[Entry] = []
+        self._front = np.empty((0, len(problem.objectives)))
         self._feasible = float("inf")
         self._violation = float("inf")
         self._round = 1
@@ -70,11 +73,12 @@ class _Best:
         if entry.evaluation.status == "feasible":
             self._feasible = min(self._feasible, minimised(self._problem, entry.evaluation))
             if len(self._problem.objectives) > 1:
-                self._front = front_entries(self._problem, [*self._front, entry])
+                values = np.array(scaled_objectives(self._problem, entry.evaluation))
+                self._front = extended(self._front, values)
         if entry.evaluation.status != "aborted":
             self._violation = min(self._violation, entry.evaluation.violation)
         before = f"round {self._round}: " if self._round > 1 else ""
-        if self._front:
+        if len(self._front):
             return f"front of {len(self._front)}"
         if self._feasible < float("inf"):
             sign = 1.0 if self._goal.sense == "minimize" else -1.0

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from tpm_design.errors import RefusedError, UsageError, did_you_mean
-from tpm_design.optimizers import convex, epsilon_constraint, multistart, nlopt, pymoo, scipy
+from tpm_design.optimizers import convex, epsilon_constraint, local, multistart, nlopt, pymoo, scipy
 from tpm_design.optimizers.base import Optimizer
 from tpm_design.optimizers.refusal import refusal
 
@@ -15,6 +15,7 @@ OPTIMIZERS: Mapping[str, Optimizer] = MappingProxyType(
         method.name: method
         for method in (
             *multistart.METHODS,
+            *local.METHODS,
             *scipy.METHODS,
             *nlopt.METHODS,
             *convex.METHODS,
@@ -24,7 +25,7 @@ OPTIMIZERS: Mapping[str, Optimizer] = MappingProxyType(
     }
 )
 
-ONE_OBJECTIVE, FRONT = "scipy.differential_evolution", "pymoo.nsga2"
+ONE_OBJECTIVE, FRONT = "multistart", "pymoo.nsga2"
 """The methods that search where a study names none."""
 
 

@@ -27,13 +27,15 @@ class Outcomes:
     divided by its metric's scale), ``merit`` (N,) = objective + exact penalty, finite everywhere.
     ``aborted`` (N,), or empty for none: points that a ``ScreeningSearch`` did not measure to the end. What is
     not known of them is 0 of a constraint, and their merit is behind those that were asked for.
-    ``objectives`` (N, k): all of them, each to minimise, of a ``FrontSearch``."""
+    Of a ``FrontSearch``: ``objectives`` (N, k), all of them, each to minimise, and ``objective_pieces``: for
+    each of them an array (N, s) whose greatest value it is, smoother in the design."""
 
     objective: FloatArray
     constraints: FloatArray
     merit: FloatArray
     aborted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     objectives: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    objective_pieces: tuple[FloatArray, ...] = ()
 
 
 class Search(Protocol):
@@ -73,6 +75,10 @@ class FrontSearch(Search, Protocol):
 
     @property
     def objective_count(self) -> int: ...
+
+    def in_pieces(self) -> FrontSearch:
+        """The same search, constraints and objectives in as many pieces as a known point has of each."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,12 @@ FINE = 1e-6
 NEGLIGIBLE = 1e-2
 """So many times that share of the objective is a gain that is not worth a step."""
 
-WIDEST_DIFFERENCE, FINEST_DIFFERENCE = 1e-4, 1e-6
-"""Steps of the difference quotients: a hundredth of the last step, within these."""
+FINEST_DIFFERENCE = 1e-6
+"""Least step of the difference quotients, as a share of each range."""
+
+SHARP, BLURRED = 0.01, 0.1
+"""Shares of the last step that difference quotients are taken over: where slopes are to be exact, and where
+small kinks and steps are to be overlooked."""
 
 ACCEPTED, POOR, GOOD = 0.05, 0.3, 0.7
 """Shares of the promised gain: from which a step is taken, below which the next is shorter, from which it may
@@ -101,18 +105,23 @@ def descend(
     radius: float,
     abandoned: Callable[[Place], bool] = never,
     fine: float = FINE,
+    steps: int = MOST_STEPS,
+    blur: float = SHARP,
 ) -> Walk:
     """Walk downhill from ``start`` in the variables ``free`` (their numbers), the others held.
 
     ``radius``: of the first trust region; ``fine``: of the last. ``abandoned``: asked at every new place
-    whether to give up. Sources: R. Fletcher, Practical methods of optimization, 1987, 14.4 (exact penalty in
-    a trust region, correction of second order); M. J. D. Powell, 1978 (damped update of the curvature).
+    whether to give up. ``steps``: at most. ``blur``: differences are taken over this share of the last step,
+    at most its square.
+
+    Sources: R. Fletcher, Practical methods of optimization, 1987, 14.4 (exact penalty in a trust region,
+    correction of second order); M. J. D. Powell, 1978 (damped update of the curvature).
     """
     if not len(free):
         return _standing(start)
     while True:
         try:
-            return (yield from _Descent(start, free, radius, fine).run(abandoned))
+            return (yield from _Descent(start, free, radius, fine, blur).run(abandoned, steps))
         except _MorePieces as more:
             start = yield from looked_at(more.here.point)
 
@@ -125,21 +134,23 @@ def _standing(start: Place) -> Landing:
 
 
 class _Descent:
-    def __init__(self, start: Place, free: NDArray[np.int64], radius: float, fine: float) -> None:
-        self._free, self._fine, self._first = free, fine, radius
+    def __init__(
+        self, start: Place, free: NDArray[np.int64], radius: float, fine: float, blur: float
+    ) -> None:
+        self._free, self._fine, self._first, self._blur = free, fine, radius, blur
         self._here = self._best = start
-        self._radius, self._width = radius, _difference(radius)
+        self._radius, self._width = radius, self._difference(radius)
         self._measure = Measure(len(start.constraints))
         self._curvature = FIRST_CURVATURE * np.eye(len(free))
         self._seen: list[tuple[Place, FloatArray]] = []
         self._failures, self._forgetting, self._harder = 0, FORGETTING, 1
         self._gradient, self._jacobian = np.zeros(len(free)), np.zeros((len(start.constraints), len(free)))
 
-    def run(self, abandoned: Callable[[Place], bool]) -> Walk:
+    def run(self, abandoned: Callable[[Place], bool], steps: int) -> Walk:
         measure = self._measure
         self._gradient, self._jacobian = yield from self._slopes(self._here)
         self._curvature *= measure.follow(self._here, self._gradient, self._jacobian)
-        for _ in range(MOST_STEPS):
+        for _ in range(steps):
             cuts = cuts_near(self._here, self._free, self._seen, measure, self._radius)
             program = self._program(cuts)
             shortfall = measure.shortfall(self._here)
@@ -227,13 +238,13 @@ class _Descent:
         length = float(np.abs(step.step).max())
         self._failures += 1
         if self._failures > 1 and length < KINKED and self._measure.shortfall(trial) > step.shortfall:
-            width, self._width = self._width, _difference(length)
+            width, self._width = self._width, self._difference(length)
             _, beyond = yield from self._slopes(trial)
             self._width = width
             self._seen.append((trial, beyond))
         self._radius = SHRINKING * min(self._radius, max(length, 0.1 * FINE))
         if self._width > FINEST_DIFFERENCE and FINE < self._radius < 30.0 * self._width:
-            self._width = _difference(self._radius)
+            self._width = self._difference(self._radius)
             self._gradient, self._jacobian = yield from self._slopes(self._here)
 
     def _move(
@@ -245,7 +256,7 @@ class _Descent:
         slope = self._gradient - self._jacobian.T @ multipliers
         self._failures = 0
         self._seen = [*self._seen, (here, self._jacobian)][-REMEMBERED:]
-        self._here, self._width = trial, _difference(length)
+        self._here, self._width = trial, self._difference(length)
         self._gradient, self._jacobian = yield from self._slopes(trial)
         turned = self._gradient - self._jacobian.T @ multipliers - slope
         way = trial.point[self._free] - here.point[self._free]
@@ -292,6 +303,9 @@ class _Descent:
         gradient = (found.objective - place.objective) / steps
         return gradient, ((found.constraints - place.constraints) / steps[:, None]).T
 
+    def _difference(self, step: float) -> float:
+        return float(np.clip(self._blur * step, FINEST_DIFFERENCE, self._blur**2))
+
     def _check(self, constraints: FloatArray) -> None:
         if len(constraints) != len(self._here.constraints):
             raise _MorePieces(self._here)
@@ -301,10 +315,6 @@ def _moved(point: FloatArray, free: NDArray[np.int64], step: FloatArray) -> Floa
     moved = point.copy()
     moved[free] = np.clip(moved[free] + step, 0.0, 1.0)
     return moved
-
-
-def _difference(step: float) -> float:
-    return float(np.clip(0.01 * step, FINEST_DIFFERENCE, WIDEST_DIFFERENCE))
 
 
 def _updated(curvature: FloatArray, way: FloatArray, turned: FloatArray) -> FloatArray:

@@ -3,12 +3,13 @@ objective, each solved by NLopt's COBYLA. Deterministic."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer, Outcomes, Stalled
+from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer, Stalled
 from tpm_design.optimizers.watch import LOCAL_STEP, Watch, objective_count, watched
 
 SURVEY = 20
@@ -50,6 +51,9 @@ def epsilon_constraint(watch: Watch, seed: int) -> str:
     objective_count(watch)
     known = _Known(watch)
     known.survey()
+    # at a design that serves the region metrics over the region have all their pieces
+    known.reach_feasible()
+    known.see_pieces()
     first = _extreme(known, 0)
     second = _extreme(known, 1)
     width = np.abs(known.objectives(second) - known.objectives(first))
@@ -99,13 +103,11 @@ class _Task:
 
 
 def _extreme(known: _Known, objective: int) -> int:
-    """The least of one objective, then the least of the other one there. Raises Stalled."""
-    other = 1 - objective
-    best = known.descend(_Task(objective, other, np.inf, np.ones(2)))
-    if not known.met(best):
-        raise Stalled("No design that meets the constraints was found near the initial one or in the survey.")
-    least = known.objectives(best)
-    return known.descend(_Task(other, objective, float(least[objective]), np.ones(2)))
+    """The least of one objective, then the least of the other one there."""
+    other, width = 1 - objective, known.range()
+    best = known.descend(_Task(objective, other, np.inf, width), STEPS)
+    least = float(known.objectives(best)[objective])
+    return known.descend(_Task(other, objective, least, width), STEPS[1:2])
 
 
 class _Known:
@@ -116,6 +118,7 @@ class _Known:
         self._points: list[FloatArray] = []
         self._objectives: list[FloatArray] = []
         self._slacks: list[FloatArray] = []
+        self._pieces: list[tuple[FloatArray, ...]] = []
         self._numbers: dict[bytes, int] = {}
 
     def objectives(self, number: int) -> FloatArray:
@@ -138,16 +141,33 @@ class _Known:
         spread = (0.5 + np.outer(np.arange(1, SURVEY * size + 1), steps)) % 1.0
         self._evaluate(np.vstack([self._watch.start, spread]))
 
+    def see_pieces(self) -> None:
+        """From here on constraints and objectives in as many pieces as a known point has; numbers stay."""
+        self._watch.see_pieces()
+        points = np.array(self._points)
+        for values in (self._points, self._objectives, self._slacks, self._pieces, self._numbers):
+            values.clear()
+        self._evaluate(points)
+
+    def range(self) -> FloatArray:
+        """By how much each objective differs among the known points that meet the constraints; 1 without."""
+        values = [o for o, s in zip(self._objectives, self._slacks, strict=True) if np.all(s >= MET)]
+        width = np.ptp(np.array(values), axis=0) if values else np.zeros(len(self._objectives[0]))
+        return np.where(width > 0.0, width, 1.0)
+
     def _evaluate(self, points: FloatArray) -> list[int]:
         """Numbers of the points; new ones are added."""
         inside: FloatArray = np.clip(points, 0.0, 1.0) + 0.0
-        found: Outcomes = self._watch.evaluate(inside)
-        for place, point in enumerate(inside):
-            if point.tobytes() not in self._numbers:
-                self._numbers[point.tobytes()] = len(self._points)
-                self._points.append(point)
+        fresh = {point.tobytes(): point for point in inside if point.tobytes() not in self._numbers}
+        if fresh:
+            new = np.array(list(fresh.values()))
+            found = self._watch.evaluate(new)
+            for place, key in enumerate(fresh):
+                self._numbers[key] = len(self._points)
+                self._points.append(new[place])
                 self._objectives.append(found.objectives[place])
                 self._slacks.append(found.constraints[place])
+                self._pieces.append(tuple(values[place] for values in found.objective_pieces))
         return [self._numbers[point.tobytes()] for point in inside]
 
     def best(self, task: _Task) -> int:
@@ -157,9 +177,17 @@ class _Known:
         violation = violation + np.maximum(0.0, values[:, task.bounded] - task.bound)
         return int(np.lexsort((values[:, task.minimised], np.where(violation <= -MET, 0.0, violation)))[0])
 
-    def descend(self, task: _Task) -> int:
-        """The best point after descents from the best known one."""
+    def reach_feasible(self) -> None:
+        """Descend until a point meets the constraints. Raises Stalled where none does."""
+        task = _Task(0, 1, np.inf, self.range())
         for step in STEPS:
+            if self.met(self.descend(task, (step,))):
+                return
+        raise Stalled("No design that meets the constraints was found near the initial one or in the survey.")
+
+    def descend(self, task: _Task, steps: Sequence[float]) -> int:
+        """The best point after descents from the best known one."""
+        for step in steps:
             self._cobyla(task, self._points[self.best(task)], step)
         return self.best(task)
 
@@ -172,31 +200,43 @@ class _Known:
         return self.best(task)
 
     def _cobyla(self, task: _Task, start: FloatArray, step: float) -> None:
+        """One descent. The greatest of several pieces is minimised as a further variable that bounds them:
+        linear models follow that around kinks."""
         import nlopt
 
-        opt = nlopt.opt(nlopt.LN_COBYLA, self._watch.dimension)
-        opt.set_lower_bounds(np.zeros(self._watch.dimension))
-        opt.set_upper_bounds(np.ones(self._watch.dimension))
+        size, first = self._watch.dimension, self._evaluate(start[None, :])[0]
+        count = len(self._pieces[first][task.minimised])
+        bound_above = count > 1
+        opt = nlopt.opt(nlopt.LN_COBYLA, size + bound_above)
+        opt.set_lower_bounds(np.append(np.zeros(size), -np.inf)[: size + bound_above])
+        opt.set_upper_bounds(np.append(np.ones(size), np.inf)[: size + bound_above])
         opt.set_initial_step(step)
         opt.set_xtol_abs(TOLERANCE)
-        opt.set_maxeval(DESCENT * (self._watch.dimension + 1))
+        opt.set_maxeval(DESCENT * (size + 1))
+
+        def shares(x: FloatArray, objective: int) -> FloatArray:
+            pieces = self._pieces[self._evaluate(x[None, :size])[0]][objective]
+            found: FloatArray = pieces / task.width[objective]
+            return found
 
         def objective(x: FloatArray, gradient: FloatArray) -> float:
-            values = self._objectives[self._evaluate(x[None, :])[0]]
-            return float(values[task.minimised] / task.width[task.minimised])
+            return float(x[size] if bound_above else shares(x, task.minimised)[0])
 
         def constraints(result: FloatArray, x: FloatArray, jacobian: FloatArray) -> None:
-            number = self._evaluate(x[None, :])[0]
-            result[: self._watch.constraint_count] = -self._slacks[number]
+            above = [-self._slacks[self._evaluate(x[None, :size])[0]]]
+            if bound_above:
+                above.append(shares(x, task.minimised) - x[size])
             if np.isfinite(task.bound):
-                above = self._objectives[number][task.bounded] - task.bound
-                result[-1] = above / task.width[task.bounded]
+                above.append(shares(x, task.bounded) - task.bound / task.width[task.bounded])
+            result[:] = np.concatenate(above)
 
-        count = self._watch.constraint_count + bool(np.isfinite(task.bound))
+        limits = self._watch.constraint_count + count * bound_above
+        if np.isfinite(task.bound):
+            limits += len(self._pieces[first][task.bounded])
         opt.set_min_objective(objective)
-        if count:
-            opt.add_inequality_mconstraint(constraints, np.zeros(count))
-        _run(opt, start)
+        if limits:
+            opt.add_inequality_mconstraint(constraints, np.zeros(limits))
+        _run(opt, np.append(start, shares(start, task.minimised).max())[: size + bound_above])
 
 
 def _run(opt: Any, start: FloatArray) -> None:

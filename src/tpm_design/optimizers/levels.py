@@ -13,11 +13,15 @@ from tpm_design.optimizers.starts import Choice, Levels, choice_of
 FEW_LEVELS = 4
 """Variables of no more levels are tried at each of them, others at the neighbouring ones, also two by two."""
 
+STRIDES = (4, 2, 1)
+"""After a move that paid, so many times as far the same way is tried as well."""
+
 TRIED = 3
 """Neighbours, the most promising first, that get a local search."""
 
-GUESSED, RADIUS = 0.2, 0.1
-"""How far from the optimum such a search may begin, and its first trust region, as shares of each range."""
+GUESSED, RADIUS, STEPS = 0.2, 0.1, 15
+"""How far from the optimum such a search may begin, and its first trust region, as shares of each range; its
+steps, at most."""
 
 
 def descend_levels(landing: Landing, levels: Levels) -> Walk:
@@ -26,8 +30,8 @@ def descend_levels(landing: Landing, levels: Levels) -> Walk:
     choice = choice_of(landing.place.point, levels)
     tried, moved = {choice}, choice
     while True:
-        jump = tuple(2 * new - old for new, old in zip(choice, moved, strict=True))
-        options = [c for c in [jump, *neighbours(choice, levels)] if c not in tried and _exists(c, levels)]
+        jumps = [tuple(a + k * (a - b) for a, b in zip(choice, moved, strict=True)) for k in STRIDES]
+        options = [c for c in [*jumps, *neighbours(choice, levels)] if c not in tried and _exists(c, levels)]
         options = list(dict.fromkeys(options))
         if not options:
             return landing
@@ -42,7 +46,7 @@ def descend_levels(landing: Landing, levels: Levels) -> Walk:
         for number in order[:TRIED]:
             tried.add(options[number])
             start = yield from looked_at(guesses[number][1])
-            trial = yield from descend(start, free, RADIUS)
+            trial = yield from descend(start, free, RADIUS, steps=STEPS)
             if trial.place.improves(landing.place):
                 landing, choice = trial, options[number]
                 break

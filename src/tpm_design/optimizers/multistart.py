@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer, Outcomes, Search
-from tpm_design.optimizers.descent import Landing, descend
+from tpm_design.optimizers.descent import BLURRED, SHARP, Landing, descend
 from tpm_design.optimizers.levels import descend_levels
 from tpm_design.optimizers.places import Place, looked_at, places
 from tpm_design.optimizers.starts import Starts, choice_of
@@ -28,13 +28,18 @@ RADIUS = 0.2
 COARSE = 1e-4
 """Trust region at which such a search has come near enough to an optimum; the best ones are finished."""
 
-POLISH_RADII = (0.03, 0.003)
-"""First trust regions of the local searches that begin again at the best optimum."""
+COARSE_STEPS = 60
 
-HOP_STARTS = 3
+POLISH = ((0.1, BLURRED), (0.03, SHARP), (0.003, SHARP))
+"""First trust region and differences of the searches that begin again where the best one ended, in turn."""
+
+AGAIN = 0.03
+"""First trust region of a search that goes on from the best place that another one saw."""
+
+HOP_STARTS = 2
 """A search from near the best optimum follows each of so many from the sample."""
 
-HOPS = (0.05, 0.2)
+HOPS = (0.1, 0.2)
 """Standard deviations, as shares of each range, by which the best optimum is perturbed for a new start."""
 
 SAME = 0.01
@@ -92,39 +97,56 @@ def multistart(search: Search, seed: int) -> str:
     return _Course(search, seed).run()
 
 
+class _UnderWay:
+    """A task, the points it waits for, and the best feasible place it saw."""
+
+    def __init__(self, task: Task, asked: FloatArray) -> None:
+        self._task, self.asked, self.over = task, asked, False
+        self.best: Place | None = None
+
+    def go_on(self, found: Outcomes) -> None:
+        """Hand over the outcomes and wait for the next points."""
+        for place in places(self.asked, found):
+            if place.violation == 0.0 and (self.best is None or place.before(self.best)):
+                self.best = place
+        try:
+            self.asked = self._task.send(found)
+        except StopIteration:
+            self.over = True
+
+
 class _Course:
     def __init__(self, search: Search, seed: int) -> None:
         self._search = search
         self._whole = self._pieces = Watch(search)
         self._levels = self._whole.levels
         self._free = np.flatnonzero(self._levels == 0)
+        self._designs = np.inf if len(self._free) else prod(self._levels.tolist())
         self._random = np.random.default_rng(seed)
         self._starts = Starts(self._whole, seed)
         self._optima: list[Optimum] = []
         self._begun = self._ended = self._landed = self._hops = 0
         self._finishing = False
+        self._left: list[Place] = []
 
     def run(self) -> str:
         self._starts.sample()
-        under_way: list[tuple[Task, FloatArray]] = []
-        while not self._converged():
+        under_way: list[_UnderWay] = []
+        while not self._few_left() and not self._converged():
             while len(under_way) < ABREAST:
                 task = self._next_task()
                 if (first := next(task, None)) is not None:
-                    under_way.append((task, first))
-            points = np.vstack([asked for _, asked in under_way])
-            found = self._evaluated(points)
-            going_on, place = [], 0
-            for task, asked in under_way:
-                part = slice(place, place + len(asked))
-                place += len(asked)
-                answer = Outcomes(found.objective[part], found.constraints[part], found.merit[part])
-                try:
-                    going_on.append((task, task.send(answer)))
-                except StopIteration:
-                    continue
-            under_way = going_on
-        if not len(self._free) and self._enumerate():
+                    under_way.append(_UnderWay(task, first))
+            found = self._evaluated(np.vstack([one.asked for one in under_way]))
+            place = 0
+            for one in under_way:
+                part = slice(place, place + len(one.asked))
+                place += len(one.asked)
+                one.go_on(Outcomes(found.objective[part], found.constraints[part], found.merit[part]))
+            self._left = [*self._left, *(one.best for one in under_way if one.over and one.best)]
+            under_way = [one for one in under_way if not one.over]
+        if self._designs <= ENUMERATED:
+            self._enumerate()
             return "Converged: every design was evaluated."
         hits = sum(optimum.hits for optimum in self._best_ones())
         return f"Converged: {hits} of {self._landed} independent local searches ended at the best objective."
@@ -143,6 +165,11 @@ class _Course:
 
     def _next_task(self) -> Task:
         best = self._best()
+        while self._left:
+            left = self._left.pop()
+            if best is None or left.improves(best.place):
+                self._left = []
+                return self._from_left(left)
         if self._ended >= FIRST_STARTS and best is not None:
             if not best.finished and not self._finishing:
                 return self._finish(best)
@@ -150,24 +177,33 @@ class _Course:
                 self._hops += 1
                 return self._hop(best)
         self._begun += 1
-        return self._from_sample(self._starts.next([optimum.place.point for optimum in self._optima]))
+        ordered = sorted(self._optima, key=lambda optimum: optimum.place.objective)
+        return self._from_sample(self._starts.next([optimum.place.point for optimum in ordered]))
 
     def _from_sample(self, sample: Place) -> Task:
         start = yield from looked_at(sample.point)
-        landing = yield from self._descended(start, RADIUS)
+        landing = yield from self._descended(start, RADIUS, SHARP)
         self._ended += 1
         yield from self._arrived(landing, independent=True)
 
+    def _from_left(self, left: Place) -> Task:
+        """From the best place that a search saw, where it went elsewhere and found nothing better."""
+        start = yield from looked_at(left.point)
+        landing = yield from self._descended(start, AGAIN, SHARP)
+        yield from self._arrived(landing, independent=False)
+
     def _hop(self, best: Optimum) -> Task:
-        sigma = HOPS[self._hops // 2 % len(HOPS)]
+        sigma = HOPS[self._hops % len(HOPS)]
         point = best.place.point.copy()
         point[self._free] += sigma * self._random.standard_normal(len(self._free))
         start = yield from looked_at(np.clip(point, 0.0, 1.0))
-        landing = yield from self._descended(start, 0.5 * RADIUS)
+        landing = yield from self._descended(start, 0.5 * RADIUS, BLURRED)
         yield from self._arrived(landing, independent=False)
 
-    def _descended(self, start: Place, radius: float) -> Generator[FloatArray, Outcomes, Landing]:
-        landing = yield from descend(start, self._free, radius, self._known, COARSE)
+    def _descended(
+        self, start: Place, radius: float, blur: float
+    ) -> Generator[FloatArray, Outcomes, Landing]:
+        landing = yield from descend(start, self._free, radius, self._known, COARSE, COARSE_STEPS, blur)
         if not len(self._free):
             landing = yield from descend_levels(landing, self._levels)
         return landing
@@ -176,9 +212,9 @@ class _Course:
         """Polish an optimum, then try its neighbours in the discrete variables."""
         self._finishing = True
         landing = best.landing
-        for radius in POLISH_RADII if len(self._free) else ():
-            further = yield from descend(landing.place, self._free, radius)
-            if further.place.improves(landing.place):
+        for radius, blur in POLISH if len(self._free) else ():
+            further = yield from descend(landing.place, self._free, radius, blur=blur)
+            if not landing.place.improves(further.place):
                 landing = further
         best.landing, best.finished = landing, True
         self._tell()
@@ -259,14 +295,16 @@ class _Course:
             ordered = sorted(self._optima, key=lambda optimum: optimum.place.objective)
             self._search.note_optima(np.array([optimum.place.point for optimum in ordered]))
 
-    def _enumerate(self) -> bool:
-        """Evaluate every design where there are few."""
+    def _few_left(self) -> bool:
+        """Whether it is time to evaluate every design: after a few local searches, or a sample as large."""
+        return self._designs <= min(ENUMERATED, 2 * self._starts.batch) or (
+            self._designs <= ENUMERATED and self._ended >= FIRST_STARTS
+        )
+
+    def _enumerate(self) -> None:
         counts = self._levels.tolist()
-        if prod(counts) > ENUMERATED:
-            return False
         numbers = np.indices(counts).reshape(len(counts), -1).T
         self._whole.evaluate((numbers + 0.5) / self._levels)
-        return True
 
 
 METHODS = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from math import ceil, log2
 
@@ -15,12 +16,16 @@ from tpm_design.optimizers.watch import Watch
 SAMPLES = 16
 """Points of the first sample for each variable and one more, at least; further samples are as large."""
 
+KEPT = 0.25
+"""Share of a sample that is measured to the end: local searches begin at none of the others."""
+
 APART, CLOSER = 0.1, 0.7
 """Least distance of starts from each other and from optima, times the root of the dimension; the factor on it
 where a whole sample has nothing so far away."""
 
-SPREAD = 0.5
-"""By which share of the sample a discrete choice falls back with each start that it had."""
+SPREAD, SPREAD_OF_BEST = 0.5, 0.15
+"""By which share of the sample a discrete choice falls back with each start that it had; the choice of the
+best optimum by less."""
 
 Levels = NDArray[np.int64]
 Choice = tuple[int, ...]
@@ -42,21 +47,23 @@ class Starts:
 
         self._search, self._levels = search, search.levels
         self._sequence = qmc.Sobol(search.dimension, scramble=True, rng=seed)
-        self._batch = 2 ** ceil(log2(SAMPLES * (search.dimension + 1)))
+        self.batch = 2 ** ceil(log2(SAMPLES * (search.dimension + 1)))
         self._samples: list[Place] = []
         self._used: list[FloatArray] = []
         self._apart = APART * np.sqrt(search.dimension)
 
     def sample(self) -> None:
         """Evaluate another batch."""
-        points = self._sequence.random(self._batch)
+        points = self._sequence.random(self.batch)
         if not self._samples:
             points = np.vstack([self._search.start, points])
         points = np.where(self._levels > 0, self._centred(points), points)
-        self._samples += places(points, self._search.evaluate(points))
+        found = self._search.screen(points, ceil(KEPT * len(points)))
+        aborted = found.aborted if found.aborted.size else np.zeros(len(points), dtype=np.bool_)
+        self._samples += [p for p, cut in zip(places(points, found), aborted, strict=True) if not cut]
 
     def next(self, optima: Sequence[FloatArray]) -> Place:
-        """The next start, away from ``optima``: the search's own first."""
+        """The next start, away from ``optima`` (best first): the search's own first."""
         if not self._used:
             return self._take(self._samples[0])
         while (found := self._most_promising(optima)) is None:
@@ -80,11 +87,13 @@ class Starts:
         sizes = np.median(np.abs([place.constraints for place in samples]), axis=0)
         violations = (shortfalls / np.where(sizes > 0.0, sizes, 1.0)).sum(axis=1)
         ranks = _ranks(objectives) + _ranks(violations)
-        choices = [choice_of(point, self._levels) for point in self._used]
-        scores = [
-            rank + SPREAD * len(samples) * choices.count(choice_of(place.point, self._levels))
-            for rank, place in zip(ranks.tolist(), samples, strict=True)
-        ]
+        used = Counter(choice_of(point, self._levels) for point in self._used)
+        best = choice_of(optima[0], self._levels) if len(optima) else None
+        scores = []
+        for rank, place in zip(ranks.tolist(), samples, strict=True):
+            choice = choice_of(place.point, self._levels)
+            spread = SPREAD_OF_BEST if choice == best else SPREAD
+            scores.append(rank + spread * len(samples) * used[choice])
         taken = np.array([*self._used, *optima])
         for number in map(int, np.argsort(scores, kind="stable")):
             place = samples[number]

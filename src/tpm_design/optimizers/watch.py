@@ -121,6 +121,12 @@ class Watch:
             jacobian=((constraints[1 : 1 + size] - constraints[1 + size :]) / width[:, None]).T,
         )
 
+    def see_pieces(self) -> None:
+        """From here on constraints and objectives in as many pieces as a known point has of each."""
+        if isinstance(self.search, FrontSearch):
+            self.search = self.search.in_pieces()
+            self.constraint_count = self.search.constraint_count
+
     def _note(self, points: FloatArray) -> None:
         """Counts points in a row that were all known before; a level counts as one value."""
         levels = np.maximum(self.levels, 1)

@@ -99,13 +99,14 @@ def _front_pictures(reported: Reported) -> list[Picture]:
         "objective as a share of its range; diamonds: the best by each objective."
     )
     found = [Picture("front.png", front_finding(reported), caption, figure)]
-    box, grown = box_of(reported), hypervolume_figure(reported)
-    if box is not None and grown is not None:
+    box = box_of(reported)
+    if box is not None:
+        course = hypervolume_course(reported, box)
         caption = (
             "The share dominated of the box between the best of each objective and the reference point, 10 % "
             f"of the front's range beyond its worst: {reference_text(reported, box)}."
         )
-        finding = hypervolume_finding(reported, hypervolume_course(reported, box))
+        finding, grown = hypervolume_finding(reported, course), hypervolume_figure(reported, course)
         found.append(Picture("hypervolume.png", finding, caption, grown))
     return found
 

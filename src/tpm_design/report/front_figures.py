@@ -23,7 +23,7 @@ from tpm_design.report.style import (
     title,
     wrapped,
 )
-from tpm_design.runs.front import FloatArray, FrontBox, front_box, non_dominated
+from tpm_design.runs.front import FloatArray, FrontBox, extended, front_box
 from tpm_design.runs.marks import KNEE, front_marks
 from tpm_design.runs.search import Entry, scaled_objectives
 from tpm_design.runs.tables import goal_unit
@@ -128,10 +128,9 @@ def hypervolume_course(reported: Reported, box: FrontBox) -> FloatArray:
     for place, entry in enumerate(reported.run.entries):
         if entry.evaluation.status == "feasible":
             values = np.array(scaled_objectives(reported.problem, entry.evaluation))
-            if not np.any(np.all(front <= values, axis=1)):
-                front = np.vstack([front, values])
-                front = front[non_dominated(front)]
-                reached = box.hypervolume(front)
+            longer = extended(front, values)
+            if longer is not front:
+                front, reached = longer, box.hypervolume(longer)
         course[place] = reached
     return course
 
@@ -146,12 +145,8 @@ def reference_text(reported: Reported, box: FrontBox) -> str:
     return ", ".join(parts)
 
 
-def hypervolume_figure(reported: Reported) -> Figure | None:
-    """None where there is no hypervolume to measure."""
-    box = box_of(reported)
-    if box is None:
-        return None
-    course = hypervolume_course(reported, box)
+def hypervolume_figure(reported: Reported, course: FloatArray) -> Figure:
+    """The hypervolume against the number of the evaluation."""
     figure = new_figure(7.5, 3.6, "constrained")
     axes = figure.subplots()
     numbers = [entry.number for entry in reported.run.entries]

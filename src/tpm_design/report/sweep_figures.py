@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullLocator
 
 from tpm_design.problem import Goal
 from tpm_design.report.reported import Reported
 from tpm_design.report.style import BLUE, GREY, INK, PALE, SMALL, new_figure, tidy, title, wrapped
-from tpm_design.report.swept import metric_values, parameter_values
+from tpm_design.report.swept import is_logarithmic, metric_values, parameter_values
 from tpm_design.runs.tables import goal_unit
 from tpm_design.study import GridSweep
 from tpm_design.study.sweep_points import plan_of_sweep, plan_size, swept_names
@@ -45,6 +47,9 @@ def scatter_figure(reported: Reported) -> Figure | None:
             if column == 0:
                 axes.set_ylabel(wrapped(_heading(reported, goal), 31), fontsize=SMALL)
         panels[-1, column].set_xlabel(wrapped(heading, 26), fontsize=SMALL)
+        if is_logarithmic(reported, name):
+            panels[-1, column].set_xscale("log")
+            _label_few(panels[-1, column].xaxis)
     panels[0, -1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=SMALL)
     title(figure, sweep_finding(reported))
     return figure
@@ -77,11 +82,24 @@ def map_figure(reported: Reported) -> Figure | None:
         axes.set_title(wrapped(_heading(reported, goal), 34), fontsize=SMALL)
         axes.set_xlabel(wrapped(across, 34), fontsize=SMALL)
         axes.set_ylabel(wrapped(up, 34), fontsize=SMALL)
+        if is_logarithmic(reported, plan.axes[0][0]):
+            axes.set_xscale("log")
+            _label_few(axes.xaxis)
+        if is_logarithmic(reported, plan.axes[1][0]):
+            axes.set_yscale("log")
+            _label_few(axes.yaxis)
         tidy(axes)
     for axes in panels[len(goals) :]:
         axes.set_axis_off()
     title(figure, sweep_finding(reported))
     return figure
+
+
+def _label_few(axis: Axis) -> None:
+    """Plain numbers at 1, 2 and 5 of each decade."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_locator(NullLocator())
 
 
 def sweep_finding(reported: Reported) -> str:

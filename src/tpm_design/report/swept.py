@@ -85,6 +85,13 @@ def _failures(reported: Reported) -> list[str]:
     return [*lines, "", f"{more} more reasons are in the table of evaluations."] if more > 0 else lines
 
 
+def is_logarithmic(reported: Reported, name: str) -> bool:
+    """Whether a quantity is searched by its logarithm, and has one at every entry."""
+    return any(v.name == name and v.scale == "log" for v in reported.problem.variables) and all(
+        float(entry.evaluation.design[name]) > 0.0 for entry in reported.run.entries
+    )
+
+
 def parameter_values(reported: Reported, name: str) -> tuple[str, list[float] | list[str]]:
     """The heading of a swept quantity, with its unit, and its value at every entry, in the study's units."""
     units = reported.study.units

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-import multiprocessing.resource_tracker
 import re
 import signal
 import time
@@ -237,23 +236,35 @@ def _local_cluster(processes: int) -> Iterator[Any]:
     """A scheduler in this process, so many workers in their own."""
     from distributed import LocalCluster
 
-    with _interrupts_held_back():
-        cluster = LocalCluster(
-            n_workers=processes,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address=None,
-            # its web server is on port 8787 otherwise, which may be taken
-            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-            env=dict.fromkeys(THREADS, "1"),
-        )
+    cluster = None
     try:
+        with _interrupts_held_back():
+            cluster = LocalCluster(
+                n_workers=processes,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address=None,
+                # its web server is on port 8787 otherwise, which may be taken
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
+                memory_limit=0,
+                silence_logs=logging.CRITICAL,
+                env=dict.fromkeys(THREADS, "1"),
+            )
+            _measure_no_garbage_collection()
         yield cluster
     finally:
-        cluster.close()
+        if cluster is not None:
+            cluster.close()
+
+
+def _measure_no_garbage_collection() -> None:
+    """A scheduler looks at each collection of garbage, and there an interrupt would be swallowed."""
+    # other versions may have it elsewhere
+    with suppress(ImportError):
+        from distributed.gc import disable_gc_diagnosis
+
+        disable_gc_diagnosis(force=True)
 
 
 @contextmanager
@@ -263,8 +274,10 @@ def _interrupts_held_back() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
+    from multiprocessing import resource_tracker
+
     # begun elsewhere, it would let interrupts through there
-    multiprocessing.resource_tracker.ensure_running()
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -8,7 +8,7 @@ import math
 import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -130,8 +130,9 @@ def entry_to_json(entry: Entry) -> dict[str, Any]:
     data["violation"] = data["violation"] if math.isfinite(data["violation"]) else None
     data["metrics"] = {k: v if math.isfinite(v) else None for k, v in data["metrics"].items()}
     data["errors"] = {k: v if math.isfinite(v) else None for k, v in data["errors"].items()}
-    if data["cutoff"] is None:
-        del data["cutoff"]
+    cutoff = data.pop("cutoff")
+    if cutoff is not None:
+        data["cutoff"] = asdict(cutoff)
     judged_by = {"judged_by": entry.judged_by} if entry.judged_by else {}
     return {"id": entry.number, "round": entry.round, **judged_by, **data}
 

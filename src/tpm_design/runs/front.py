@@ -31,6 +31,14 @@ def non_dominated(values: FloatArray) -> NDArray[np.intp]:
     return np.array(chosen, dtype=np.intp)
 
 
+def extended(front: FloatArray, row: FloatArray) -> FloatArray:
+    """A front (M, k) with one more row (k,), without those that it dominates; the same array where one of
+    its rows is at most as large in every column."""
+    if np.any(np.all(front <= row, axis=1)):
+        return front
+    return np.vstack([front[~np.all(row <= front, axis=1)], row])
+
+
 def extremes(front: FloatArray) -> NDArray[np.intp]:
     """For each column the row that is least in it, of equal ones that with the least sum of shares."""
     total = _shares(front).sum(axis=1)

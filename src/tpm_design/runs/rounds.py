@@ -43,6 +43,9 @@ ROUND_EVALUATIONS = 20
 STARTS = 10
 """Entries of the round before with which a further round begins."""
 
+LOCAL = "descent"
+"""The local method of further rounds where the study names none."""
+
 NEIGHBOURHOODS = (0.02, 0.004)
 """Half widths, as shares of each range, in which a further round polishes: tolerances ask for little."""
 
@@ -217,16 +220,14 @@ def starting_entries(problem: Problem, entries: Sequence[Entry], most: int) -> l
 
 
 def _refine(log: EvaluationLog, plan: SearchPlan, limit: int) -> tuple[str, str]:
-    """Search near what the log holds: by the local method, else by the study's own around the best design."""
+    """Search near what the log holds, by the study's local method if it names one."""
     whole = view_of(log, limit)
-    local = optimizer(plan.method if plan.polish is None else plan.polish)
-    if not local.abilities.whole_space:
-        return polish_best(local, whole, limit, plan.seed, neighbourhoods=NEIGHBOURHOODS, in_order=True)
-    best = log.best()
+    method = optimizer(plan.method if plan.polish is None else plan.polish)
     count = sum(not variable.values for variable in log.problem.variables)
-    if best is None or count < max(1, local.abilities.smallest_dimension):
-        return run_method(local, whole, plan.seed)
-    return run_method(local, whole.continuous_near(best, NEIGHBOURHOODS[0], limit), plan.seed)
+    if not count:
+        return run_method(method, whole, plan.seed)
+    local = optimizer(LOCAL) if method.abilities.whole_space else method
+    return polish_best(local, whole, limit, plan.seed, neighbourhoods=NEIGHBOURHOODS, in_order=True)
 
 
 def with_counterexamples(problem: Problem, found: Verdict, samples: tuple[Sample, ...]) -> tuple[Sample, ...]:

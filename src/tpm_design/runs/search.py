@@ -164,13 +164,14 @@ class EvaluationLog:
 @dataclass(frozen=True)
 class UnitSearch:
     """A ``Search`` over a design space, up to ``limit`` entries in the log. ``sizes``: in how many smooth
-    pieces each constraint is given to the optimiser."""
+    pieces each constraint is given to the optimiser; ``objective_sizes``: each objective, empty for one."""
 
     log: EvaluationLog
     space: DesignSpace
     start: FloatArray
     limit: int
     sizes: tuple[int, ...]
+    objective_sizes: tuple[int, ...] = ()
 
     @property
     def dimension(self) -> int:
@@ -192,7 +193,7 @@ class UnitSearch:
         """Values at ``points`` (N, n). Raises BudgetSpent."""
         table = np.atleast_2d(np.asarray(points, dtype=np.float64))
         results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
-        return outcomes(self.log.problem, results, self.sizes)
+        return outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
 
     def screen(self, points: FloatArray, keep: int) -> Outcomes:
         """As ``ScreeningSearch``. The cutoff of each ``SCREENED`` points is the best ``keep``-th of those
@@ -206,9 +207,14 @@ class UnitSearch:
         return outcomes(self.log.problem, results, self.sizes)
 
     def in_pieces(self) -> UnitSearch:
-        """The same search, each constraint in as many smooth pieces as a design in the log had."""
-        most = self.log.most_pieces
-        return replace(self, sizes=tuple(most.get(goal.label, 1) for goal in self.log.problem.constraints))
+        """The same search, each constraint and objective in as many smooth pieces as a design in the log
+        had."""
+        most, problem = self.log.most_pieces, self.log.problem
+        return replace(
+            self,
+            sizes=tuple(most.get(goal.label, 1) for goal in problem.constraints),
+            objective_sizes=tuple(most.get(goal.label, 1) for goal in problem.objectives),
+        )
 
     def note_optima(self, points: FloatArray) -> None:
         """The local optima (N, n) that the method knows by now."""
@@ -312,10 +318,16 @@ def _minimised(goal: Goal, evaluation: Evaluation) -> float:
     return scaled_objective(goal, value)
 
 
-def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[int]) -> Outcomes:
+def outcomes(
+    problem: Problem,
+    results: Sequence[Evaluation],
+    sizes: Sequence[int],
+    objective_sizes: Sequence[int] = (),
+) -> Outcomes:
     """What an optimiser gets to see, finite everywhere. ``sizes``: number of pieces of each constraint; a
-    constraint of fewer pieces repeats its least. Of aborted evaluations constraints that were not measured
-    are 0, and the merit is behind that of the cutoff."""
+    constraint of fewer pieces repeats its least. ``objective_sizes``: of each objective, by default one.
+    Constraints that were not measured, of aborted evaluations, are 0, and the merit is behind that of the
+    cutoff."""
     objectives = np.array([scaled_objectives(problem, result) for result in results])
     objectives = objectives.reshape(len(results), len(problem.objectives))
     objective = objectives[:, 0]
@@ -332,9 +344,23 @@ def outcomes(problem: Problem, results: Sequence[Evaluation], sizes: Sequence[in
     violation = np.array(
         [result.violation if math.isfinite(result.violation) else FAILED for result in results]
     )
+    pieces = tuple(
+        np.array([_objective_pieces(goal, result, size) for result in results]).reshape(len(results), size)
+        for goal, size in zip(
+            problem.objectives, objective_sizes or (1,) * len(problem.objectives), strict=True
+        )
+    )
     aborted = np.array([result.cutoff is not None for result in results], dtype=np.bool_)
     merit = np.where(aborted, FAILED, objective) + PENALTY * violation
-    return Outcomes(objective, constraints, merit, aborted, objectives)
+    return Outcomes(objective, constraints, merit, aborted, objectives=objectives, objective_pieces=pieces)
+
+
+def _objective_pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:
+    """Values of which the greatest is the objective; its own one ``size`` times where there are no such."""
+    value = _minimised(goal, result)
+    sign = (1.0 if goal.sense == "minimize" else -1.0) / goal.metric.scale
+    pieces = tuple(sign * piece for piece in result.pieces.get(goal.label, ()))
+    return pieces if len(pieces) == size and max(pieces) == value else (value,) * size
 
 
 def _pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.metrics.base import Metric, Option
+from tpm_design.optimizers import default_method
 from tpm_design.study.comparison import SHARED_ONLY
 from tpm_design.study.model import ARCHITECTURES, NAME, PYTHON_FILE, StudyModel
 from tpm_design.study.registries import Registries, registries
@@ -34,7 +35,7 @@ def study_schema() -> Schema:
         _metrics(definitions[name], known)
     method = definitions["OptimizerModel"]["properties"]
     method["method"] = {
-        "description": "by default scipy.differential_evolution, pymoo.nsga2 for several objectives",
+        "description": f"by default {default_method(1)}, for several objectives {default_method(2)}",
         "enum": [*sorted(known.optimizers), None],
         "default": None,
     }

@@ -55,7 +55,7 @@ objectives:
 {_objective(kind)}
 constraints:
 {chr(10).join(_constraints(kind))}
-optimizer: {{method: scipy.differential_evolution, budget: 400, seed: 1}}    # budget: designs evaluated
+optimizer: {{method: multistart, budget: 400, seed: 1}}    # budget: designs evaluated
 accuracy: {{volume: 1e-3}}    # relative error of volumes and averages
 """
 

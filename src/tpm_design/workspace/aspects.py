@@ -191,6 +191,22 @@ def reach_parts(mechanism: Mechanism, mode: Mode, rays: RaySet) -> Segments:
     return _fields(mechanism, mode, (rays, NO_RAYS), limits, sided=False, scale=(1.0, 1.0, 1.0))[0].segments
 
 
+def ball_field(
+    mechanism: Mechanism,
+    mode: Mode,
+    *,
+    centre: tuple[float, float, float],
+    radius: float,
+    order: int,
+    floor: float = 0.0,
+) -> RayField:
+    """Rays every way from ``centre``, as far as ``radius`` (m), cut as sided ones of ``mode_fields``."""
+    rays = ray_set(ALL_OCTANTS, order)
+    limits, scale = (1.0 / rays.lengths, np.empty(0)), (radius, radius, radius)
+    both = (rays, NO_RAYS), limits
+    return _fields(mechanism, mode, *both, sided=True, floor=floor, origin=centre, scale=scale)[0]
+
+
 def mode_octants(mode: Mode) -> tuple[Octant, ...]:
     """The octants the mode may lie in: its own, or all."""
     return _octants_of(getattr(mode.signs, "octant", (0.0, 0.0, 0.0)))
