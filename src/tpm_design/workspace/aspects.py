@@ -202,8 +202,8 @@ def ball_field(
 ) -> RayField:
     """Rays every way from ``centre``, as far as ``radius`` (m), cut as sided ones of ``mode_fields``."""
     rays = ray_set(ALL_OCTANTS, order)
-    limits, scale = 1.0 / rays.lengths, (radius, radius, radius)
-    both = (rays, rays), (limits, limits)
+    limits, scale = (1.0 / rays.lengths, np.empty(0)), (radius, radius, radius)
+    both = (rays, NO_RAYS), limits
     return _fields(mechanism, mode, *both, sided=True, floor=floor, origin=centre, scale=scale)[0]
 
 
