@@ -28,7 +28,7 @@ RADIUS = 0.2
 COARSE = 1e-4
 """Trust region at which such a search has come near enough to an optimum; the best ones are finished."""
 
-COARSE_STEPS = 30
+COARSE_STEPS = 60
 """After so many steps it ends in any case: those that take longer seldom lead anywhere."""
 
 POLISH = ((0.1, BLURRED), (0.03, SHARP), (0.003, SHARP))
@@ -37,7 +37,7 @@ POLISH = ((0.1, BLURRED), (0.03, SHARP), (0.003, SHARP))
 AGAIN = 0.03
 """First trust region of a search that goes on from the best place that another one saw."""
 
-HOP_STARTS = 2
+HOP_STARTS = 3
 """A search from near the best optimum follows each of so many from the sample."""
 
 HOPS = (0.17, 0.35)

@@ -13,7 +13,7 @@ from tpm_design.optimizers.base import FloatArray
 from tpm_design.optimizers.places import Place, places
 from tpm_design.optimizers.watch import Watch
 
-SAMPLES = 16
+SAMPLES = 24
 """Points of the first sample for each variable and one more, at least; further samples are as large."""
 
 KEPT = 0.25
@@ -23,7 +23,7 @@ APART, CLOSER = 0.1, 0.7
 """Least distance of starts from each other and from optima, times the root of the dimension; the factor on it
 where a whole sample has nothing so far away."""
 
-SPREAD, SPREAD_OF_BEST = 0.5, 0.15
+SPREAD, SPREAD_OF_BEST = 0.5, 0.3
 """By which share of the sample a discrete choice falls back with each start that it had; the choice of the
 best optimum by less."""
 
