@@ -25,12 +25,14 @@ Formula = Callable[[Mapping[str, float]], float]
 
 @dataclass(frozen=True)
 class KnownOptimum:
-    """``optimum``: the first objective's best value, SI, and where it is known from."""
+    """``optimum``: the first objective's best value, SI, and where it is known from; ``budget``: evaluations,
+    those of the study where there is one."""
 
     name: str
     problem: Problem
     optimum: float
     source: str
+    budget: int = 2000
 
 
 def known_optima() -> tuple[KnownOptimum, ...]:
@@ -41,17 +43,21 @@ def known_optima() -> tuple[KnownOptimum, ...]:
             load_study(STUDIES / "04-orthoglide-velocity.yaml").problem,
             3.0 * 0.2 / 0.6439506,
             "closed form, edge/L = 0.6439506",
+            3000,
         ),
         KnownOptimum(
             "crr cube",
             load_study(STUDIES / "03-crr-cube.yaml").problem,
             3.0 * 0.3 * math.sqrt(5.0) / 2.0,
             "closed form, f + r = a√5/2",
+            1500,
         ),
-        KnownOptimum("crr cube, folded", folded_crr(), 3.0 * 0.3 / math.sqrt(2.0), "convex, f + r = a/√2"),
+        KnownOptimum(
+            "crr cube, folded", folded_crr(), 3.0 * 0.3 / math.sqrt(2.0), "convex, f + r = a/√2", 1500
+        ),
         KnownOptimum("uru reach", uru_reach(), 3.0 * 0.326803, "convex, f + r = √(a²/4 + 2(a+μ)²)"),
         KnownOptimum(
-            "uru cube", load_study(STUDIES / "01-uru-cube.yaml").problem, BEST_URU_CUBE, "best known"
+            "uru cube", load_study(STUDIES / "01-uru-cube.yaml").problem, BEST_URU_CUBE, "best known", 4000
         ),
         KnownOptimum(
             "uru volume", load_study(STUDIES / "02-uru-volume.yaml").problem, BEST_URU_VOLUME, "best known"

@@ -169,12 +169,13 @@ def main() -> None:
     parser.add_argument("--methods", nargs="*", default=able, choices=able, metavar="NAME")
     parser.add_argument("--problems", nargs="*", default=names, choices=names, metavar="NAME")
     parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--budget", type=int, default=2000, help="evaluations of each run")
+    parser.add_argument("--budget", type=int, help="evaluations of each run; default: the problem's")
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--json", type=Path, help="also write every run here")
     arguments = parser.parse_args()
+    budgets = {case.name: arguments.budget or case.budget for case in known_optima()}
     tasks = [
-        (problem, method, seed, arguments.budget)
+        (problem, method, seed, budgets[problem])
         for problem in arguments.problems
         for method in arguments.methods
         for seed in range(1, arguments.seeds + 1)
@@ -183,14 +184,13 @@ def main() -> None:
         found = [outcome for outcome in pool.imap(one, tasks) if outcome is not None]
     if arguments.json is not None:
         arguments.json.write_text(json.dumps([asdict(o) for o in found], indent=1) + "\n", encoding="utf-8")
-    print(f"{arguments.seeds} seeds, {arguments.budget} evaluations each; median evaluations to 0.1 %, time")
-    print("| problem | method | within 0.1 % | evaluations | excess, median | worst | s per run |")
-    print("|---|---|---:|---:|---:|---:|---:|")
+    print("| problem | budget | method | within 0.1 % | after, median | excess, median | worst | s per run |")
+    print("|---|---:|---|---:|---:|---:|---:|---:|")
     for problem in arguments.problems:
         for method in arguments.methods:
             runs = [o for o in found if (o.problem, o.method) == (problem, method)]
             if runs:
-                print(f"| {problem} | {method} | {summary(runs)} |")
+                print(f"| {problem} | {budgets[problem]} | {method} | {summary(runs)} |")
 
 
 def summary(runs: Sequence[Outcome]) -> str:

@@ -37,6 +37,10 @@ POLISH = ((0.1, BLURRED), (0.03, SHARP), (0.003, SHARP))
 AGAIN = 0.03
 """First trust region of a search that goes on from the best place that another one saw."""
 
+RIVALS, NEARLY = 3, 0.05
+"""The best optima of so many discrete choices are looked at more closely, if their objectives are no farther
+than this share from the best: which choice is best shows only then."""
+
 HOP_STARTS = 3
 """A search from near the best optimum follows each of so many from the sample."""
 
@@ -172,11 +176,13 @@ class _Course:
                 self._left = []
                 return self._from_left(left)
         if self._ended >= FIRST_STARTS and best is not None:
-            if not best.finished and not self._finishing:
-                return self._finish(best)
+            rivals = self._rivals(best)
+            unfinished = next((rival for rival in rivals if not rival.finished), None)
+            if unfinished is not None and not self._finishing:
+                return self._finish(unfinished)
             if self._begun >= HOP_STARTS * (self._hops + 1):
                 self._hops += 1
-                return self._hop(best)
+                return self._hop(rivals[self._hops // len(HOPS) % len(rivals)])
         self._begun += 1
         ordered = sorted(self._optima, key=lambda optimum: optimum.place.objective)
         return self._from_sample(self._starts.next([optimum.place.point for optimum in ordered]))
@@ -193,9 +199,9 @@ class _Course:
         landing = yield from self._descended(start, AGAIN, SHARP)
         yield from self._arrived(landing, independent=False)
 
-    def _hop(self, best: Optimum) -> Task:
+    def _hop(self, optimum: Optimum) -> Task:
         sigma = HOPS[self._hops % len(HOPS)] / max(1, len(self._free)) ** 0.5
-        point = best.place.point.copy()
+        point = optimum.place.point.copy()
         point[self._free] += sigma * self._random.standard_normal(len(self._free))
         start = yield from looked_at(np.clip(point, 0.0, 1.0))
         landing = yield from self._descended(start, 0.5 * RADIUS, BLURRED)
@@ -209,19 +215,19 @@ class _Course:
             landing = yield from descend_levels(landing, self._levels)
         return landing
 
-    def _finish(self, best: Optimum) -> Task:
-        """Polish an optimum, then try its neighbours in the discrete variables."""
+    def _finish(self, optimum: Optimum) -> Task:
+        """Polish an optimum, then, of the best one, try the neighbours in the discrete variables."""
         self._finishing = True
-        landing = best.landing
+        landing = optimum.landing
         for radius, blur in POLISH if len(self._free) else ():
             further = yield from descend(landing.place, self._free, radius, blur=blur)
             if not landing.place.improves(further.place):
                 landing = further
-        best.landing, best.finished = landing, True
+        optimum.landing, optimum.finished = landing, True
         self._tell()
-        if np.any(self._levels > 0):
+        if np.any(self._levels > 0) and optimum is self._best():
             landing = yield from descend_levels(landing, self._levels)
-            if landing is not best.landing:
+            if landing is not optimum.landing:
                 yield from self._arrived(landing, independent=False)
         self._finishing = False
 
@@ -274,6 +280,15 @@ class _Course:
 
     def _best(self) -> Optimum | None:
         return min(self._optima, key=lambda optimum: optimum.place.objective, default=None)
+
+    def _rivals(self, best: Optimum) -> list[Optimum]:
+        """The best optimum of each discrete choice that comes near the best of all, which is the first."""
+        bound = best.place.objective + NEARLY * abs(best.place.objective)
+        rivals: dict[object, Optimum] = {}
+        for optimum in sorted(self._optima, key=lambda optimum: optimum.place.objective):
+            if optimum.place.objective <= bound:
+                rivals.setdefault(choice_of(optimum.place.point, self._levels), optimum)
+        return list(rivals.values())[:RIVALS]
 
     def _best_ones(self) -> list[Optimum]:
         best = self._best()
