@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import dask
+import distributed  # noqa: F401 - fills dask.config: within config.set it would be taken out again
 import psutil
 import pytest
 from clusters import environment, evaluated_or_killed, scheduler, worker
