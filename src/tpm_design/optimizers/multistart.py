@@ -13,7 +13,7 @@ from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer, Outcome
 from tpm_design.optimizers.descent import BLURRED, SHARP, Landing, descend
 from tpm_design.optimizers.levels import descend_levels
 from tpm_design.optimizers.places import Place, looked_at, places
-from tpm_design.optimizers.starts import Starts, choice_of
+from tpm_design.optimizers.starts import Starts, are_one, choice_of
 from tpm_design.optimizers.watch import Watch
 
 ABREAST = 4
@@ -46,9 +46,6 @@ HOP_STARTS = 3
 
 HOPS = (0.17, 0.35)
 """Distances, as shares of the ranges, by which the best optimum is perturbed for a new start."""
-
-SAME = 0.01
-"""Optima of the same discrete choice that are nearer than this in every coordinate of the cube are one."""
 
 EQUAL = 1e-4
 """Optima whose objectives differ by a smaller share than this are equally good."""
@@ -240,8 +237,7 @@ class _Course:
 
     def _near(self, place: Place) -> Optimum | None:
         for optimum in self._optima:
-            near = float(np.abs(optimum.place.point - place.point).max()) < SAME
-            if near and self._alike(place, optimum.place):
+            if are_one(optimum.place.point, place.point, self._levels):
                 return optimum
         return None
 

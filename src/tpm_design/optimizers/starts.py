@@ -27,6 +27,9 @@ SPREAD, SPREAD_OF_BEST = 0.5, 0.3
 """By which share of the sample a discrete choice falls back with each start that it had; the choice of the
 best optimum by less."""
 
+SAME = 0.01
+"""Optima of the same discrete choice that are nearer than this in every coordinate of the cube are one."""
+
 Levels = NDArray[np.int64]
 Choice = tuple[int, ...]
 
@@ -36,6 +39,12 @@ def choice_of(point: FloatArray, levels: Levels) -> Choice:
     discrete = levels > 0
     numbers = np.floor(point[discrete] * levels[discrete]).astype(int)
     return tuple(np.minimum(numbers, levels[discrete] - 1).tolist())
+
+
+def are_one(point: FloatArray, other: FloatArray, levels: Levels) -> bool:
+    """Whether two optima, points (n,) of the cube, count as one."""
+    near = float(np.abs(point - other).max()) < SAME
+    return near and choice_of(point, levels) == choice_of(other, levels)
 
 
 class Starts:

@@ -7,12 +7,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from tpm_design.design_space import DesignSpace
+from tpm_design.optimizers.starts import are_one
 from tpm_design.problem import Design, Problem
 from tpm_design.runs.search import Entry, design_key, rank
-
-SAME = 0.01
-"""Designs of the same discrete choice that are nearer than this share of its range in every continuous
-variable are one optimum."""
 
 
 def distinct_optima(
@@ -29,18 +26,14 @@ def distinct_optima(
     if best.evaluation.status != "feasible":
         return (best,)
     keys = {design_key(design) for design in noted}
-    optima = [best]
+    optima, levels = [best], np.array(space.levels)
     for entry in sorted(entries, key=lambda entry: rank(problem, entry)):
         evaluation = entry.evaluation
         if entry.round != best.round or evaluation.status != "feasible":
             continue
-        if design_key(evaluation.design) in keys and not any(_same(space, entry, known) for known in optima):
+        if design_key(evaluation.design) not in keys:
+            continue
+        point = space.point(evaluation.design)
+        if not any(are_one(point, space.point(known.evaluation.design), levels) for known in optima):
             optima.append(entry)
     return tuple(optima)
-
-
-def _same(space: DesignSpace, one: Entry, other: Entry) -> bool:
-    first, second = one.evaluation.design, other.evaluation.design
-    if any(first[v.name] != second[v.name] for v in space.variables if v.values):
-        return False
-    return float(np.abs(space.point(first) - space.point(second)).max()) < SAME
