@@ -20,7 +20,7 @@ from test_optimizers import BRANIN, HYPERBOLA, REDUCER, Case, MemoSearch
 from tpm_design.baselines.reproduction import reproduce
 from tpm_design.optimizers import optimizer
 from tpm_design.optimizers.base import BudgetSpent, FloatArray, Outcomes, Search
-from tpm_design.optimizers.descent import descend
+from tpm_design.optimizers.descent import Walk, descend
 from tpm_design.optimizers.places import looked_at
 from tpm_design.optimizers.quadratic import Program, elastic_step
 from tpm_design.optimizers.starts import SAME
@@ -220,7 +220,7 @@ def test_mixed_problems_end_at_the_optimum_of_the_best_choice(seed: int) -> None
 def walked(case: Case, start: tuple[float, ...]) -> tuple[MemoSearch, FloatArray]:
     found = MemoSearch(case, 5000)
 
-    def whole() -> Iterator[FloatArray]:
+    def whole() -> Walk:
         here = yield from looked_at(np.array(start))
         landing = yield from descend(here, np.arange(len(start)), 0.2)
         ends.append(landing.place.point)
@@ -230,7 +230,7 @@ def walked(case: Case, start: tuple[float, ...]) -> tuple[MemoSearch, FloatArray
     asked = next(walk)
     while not ends:
         try:
-            asked = walk.send(found.evaluate(asked))  # type: ignore[attr-defined]
+            asked = walk.send(found.evaluate(asked.points))  # type: ignore[attr-defined]
         except StopIteration:
             break
     return found, ends[0]

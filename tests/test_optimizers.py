@@ -401,13 +401,14 @@ def test_slopes_of_a_quadratic_are_exact_inside_and_near_at_the_bounds(point: li
         return bowl(x)[0], [float(x[0] * x[1] - 0.5 * x[2]), float(x[2])]
 
     x = np.array(point)
-    slopes = Watch(MemoSearch(Case(quadratic, (0.5,) * 3, 0.0, constraints=2), 7)).slopes(x)
+    tangents = Watch(MemoSearch(Case(quadratic, (0.5,) * 3, 0.0, constraints=2), 7)).tangents(x)
+    slopes = tangents.slopes
     gradient = 2 * np.array([1.0, 3.0, 10.0]) * (x - np.array([0.3, 0.7, 0.9]))
     at_bound = np.minimum(x, 1 - x) < DIFFERENCE_STEP
     allowed = np.where(at_bound, DIFFERENCE_STEP * np.array([1.0, 3.0, 10.0]), 0.0) + 1e-9
     assert np.all(np.abs(slopes.gradient - gradient) <= allowed)
     assert slopes.jacobian == pytest.approx(np.array([[x[1], x[0], -0.5], [0.0, 0.0, 1.0]]), abs=1e-9)
-    assert slopes.objective == bowl(x)[0]
+    assert tangents.objective == bowl(x)[0]
 
 
 @methods()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -110,6 +110,21 @@ class Cutoff:
 
 
 @dataclass(frozen=True)
+class Neighbour:
+    """A design next to another one: ``step`` of the unit cube away from it along one free variable."""
+
+    design: Design
+    step: float
+
+
+Neighbours = Sequence[Neighbour]
+
+Slopes = Mapping[str, tuple[tuple[float, ...], ...]]
+"""Label → of each of its pieces (constraints: of the slacks; an objective without pieces: of its value) the
+derivative along each neighbour's variable, SI per unit of the cube. Missing: not known to first order."""
+
+
+@dataclass(frozen=True)
 class Evaluation:
     """One evaluated design, SI units. ``slacks``: constraint label → signed distance to its bound, the
     least of its ``pieces``: one number, or a fixed number of them, smoother in the design; those of the
@@ -117,7 +132,7 @@ class Evaluation:
     the greatest, none where it is one by itself.
 
     "aborted": found to be worse than ``cutoff`` before everything was measured. What was not measured is
-    missing; ``violation`` is what it is at least.
+    missing; ``violation`` is what it is at least. ``slopes``: None where they were not asked for.
     """
 
     design: Design
@@ -131,6 +146,7 @@ class Evaluation:
     reason: str
     seconds: float
     cutoff: Cutoff | None = None
+    slopes: Slopes | None = None
 
 
 def with_ties(ties: Mapping[str, str], design: Design) -> Design:
@@ -138,13 +154,18 @@ def with_ties(ties: Mapping[str, str], design: Design) -> Design:
     return {**design, **{name: design[source] for name, source in ties.items()}}
 
 
-def evaluate(problem: Problem, design: Design, cutoff: Cutoff | None = None) -> Evaluation:
+def evaluate(
+    problem: Problem,
+    design: Design,
+    cutoff: Cutoff | None = None,
+    neighbours: Neighbours | None = None,
+) -> Evaluation:
     """Every objective, constraint and recorded metric of one design, the cheap ones first.
 
     A constraint is met only on the unfavourable side of its metric's numeric error, and where the problem's
     samples meet it too. A design that cannot be built or measured gets status "failed" and its reason;
     nothing is raised. With a ``cutoff`` the evaluation ends as "aborted" as soon as the design is sure to be
-    worse: measured to the end it would be.
+    worse: measured to the end it would be. With ``neighbours`` come slopes.
     """
     began = time.perf_counter()
     measured: dict[str, Measurement] = {}
@@ -160,12 +181,13 @@ def evaluate(problem: Problem, design: Design, cutoff: Cutoff | None = None) -> 
             if why:
                 return _judged(problem, design, measured, began, cutoff=cutoff, why=why)
         sampled = _sampled(problem, context, measured)
+        slopes = None if neighbours is None else _slopes(problem, context, measured, sampled, neighbours)
     except (ParameterError, ArithmeticError) as error:
         reason = error.what if isinstance(error, ParameterError) else str(error)
         return Evaluation(
             dict(design), {}, {}, {}, {}, {}, math.inf, "failed", reason, time.perf_counter() - began
         )
-    return _judged(problem, design, measured, began, sampled=sampled)
+    return _judged(problem, design, measured, began, sampled=sampled, slopes=slopes)
 
 
 def is_worse(problem: Problem, evaluation: Evaluation, cutoff: Cutoff) -> bool:
@@ -250,6 +272,7 @@ def _judged(
     sampled: _Sampled | None = None,
     cutoff: Cutoff | None = None,
     why: str = "",
+    slopes: Slopes | None = None,
 ) -> Evaluation:
     """The evaluation of what was measured: everything, or enough to be worse than a cutoff."""
     sampled = sampled or _Sampled({}, {})
@@ -282,6 +305,7 @@ def _judged(
         reason=reason,
         seconds=time.perf_counter() - began,
         cutoff=cutoff,
+        slopes=slopes,
     )
 
 
@@ -307,10 +331,13 @@ def design_context(problem: Problem, design: Design) -> Context:
 
 @dataclass(frozen=True)
 class _Sampled:
-    """``pieces``: slacks of the samples by constraint, less their margins; ``reasons``: why one is missed."""
+    """``pieces``: slacks of the samples by constraint, less their margins; ``reasons``: why one is missed.
+    ``measured``: what each sample was judged by, over the region and at its pose; nothing where its machine
+    cannot be."""
 
     pieces: Mapping[str, tuple[float, ...]]
     reasons: Mapping[str, str]
+    measured: tuple[tuple[Measurement, ...], ...] = ()
 
     def why(self, label: str) -> str:
         return f" {self.reasons[label]}" if label in self.reasons else ""
@@ -318,30 +345,128 @@ class _Sampled:
 
 def _sampled(problem: Problem, context: Context, nominal: Mapping[str, Measurement]) -> _Sampled:
     goals = {goal.label: goal for goal in problem.constraints}
-    # samples of the same machine share what their metrics need
-    contexts: dict[tuple[tuple[str, tuple[float, ...]], ...], Context | str] = {(): context}
+    machines = _Machines(problem, context)
     pieces: dict[str, tuple[float, ...]] = {}
     reasons: dict[str, str] = {}
+    measured: list[tuple[Measurement, ...]] = []
     for sample in problem.samples:
-        goal, machine = goals[sample.label], tuple(sorted(sample.offsets.items()))
-        if machine not in contexts:
-            contexts[machine] = _offset_context(problem, context, sample.offsets)
-        of_machine = contexts[machine]
-        if isinstance(of_machine, str):
+        goal, machine = goals[sample.label], machines.of(sample)
+        if isinstance(machine, str):
+            measured.append(())
             found: tuple[float, ...] = (-UNDEFINED_VIOLATION * goal.metric.scale,)
-            why = f"within the tolerances: {of_machine}"
+            why = f"within the tolerances: {machine}"
         else:
-            over = nominal[sample.label] if not machine else _measure(of_machine, goal)
-            values = slack_pieces(goal, over)
+            over = _measure(machine, goal) if sample.offsets else nominal[sample.label]
+            judged = [over]
             if sample.pose is not None:
-                at_pose = replace(of_machine, region=_pose_region(of_machine, sample.pose))
-                values = (*values, min(slack_pieces(goal, _measure(at_pose, goal))))
-            found = tuple(value - sample.margin for value in values)
-            why = "within the tolerances" if machine else "by the margin that its proof needs"
+                judged.append(_measure(replace(machine, region=_pose_region(machine, sample.pose)), goal))
+            measured.append(tuple(judged))
+            found = _sample_slacks(goal, sample, judged)
+            why = "within the tolerances" if sample.offsets else "by the margin that its proof needs"
         pieces[sample.label] = pieces.get(sample.label, ()) + found
         if min(found) < 0.0:
             reasons.setdefault(sample.label, why)
-    return _Sampled(pieces, reasons)
+    return _Sampled(pieces, reasons, tuple(measured))
+
+
+def _sample_slacks(goal: Goal, sample: Sample, judged: Sequence[Measurement]) -> tuple[float, ...]:
+    """Over the region all slacks, at the sample's pose the least."""
+    values = slack_pieces(goal, judged[0])
+    for at_pose in judged[1:]:
+        values = (*values, min(slack_pieces(goal, at_pose)))
+    return tuple(value - sample.margin for value in values)
+
+
+class _Machines:
+    """The machines of a problem's samples in the place of one design; samples of the same machine share what
+    their metrics need."""
+
+    def __init__(self, problem: Problem, context: Context) -> None:
+        self._problem, self._nominal = problem, context
+        self._found: dict[tuple[tuple[str, tuple[float, ...]], ...], Context | str] = {(): context}
+
+    def of(self, sample: Sample) -> Context | str:
+        """The machine's context, or why there is no such machine."""
+        machine = tuple(sorted(sample.offsets.items()))
+        if machine not in self._found:
+            self._found[machine] = _offset_context(self._problem, self._nominal, sample.offsets)
+        return self._found[machine]
+
+
+def _slopes(
+    problem: Problem,
+    context: Context,
+    measured: Mapping[str, Measurement],
+    sampled: _Sampled,
+    neighbours: Neighbours,
+) -> Slopes:
+    """Difference quotients of what a design's measurements say of its neighbours."""
+    here = _seen_near(problem, context, measured, sampled)
+    there = []
+    for neighbour in neighbours:
+        try:
+            there.append(_seen_near(problem, design_context(problem, neighbour.design), measured, sampled))
+        except ParameterError:
+            return {}
+    slopes = {}
+    for label, values in here.items():
+        found = [
+            [(after - before) / neighbour.step for before, after in zip(values, seen[label], strict=True)]
+            for neighbour, seen in zip(neighbours, there, strict=True)
+        ]
+        rows = tuple(zip(*found, strict=True)) if found else ((),) * len(values)
+        if all(math.isfinite(slope) for row in rows for slope in row):
+            slopes[label] = rows
+    return slopes
+
+
+def _seen_near(
+    problem: Problem, context: Context, measured: Mapping[str, Measurement], sampled: _Sampled
+) -> dict[str, tuple[float, ...]]:
+    """Pieces of objectives and constraints as the measurements of a design next to this one tell them."""
+    found: dict[str, tuple[float, ...]] = {}
+    for goal in problem.objectives:
+        near = measured[goal.label].near
+        if near is not None:
+            there = near(context)
+            in_pieces = there.pieces if len(problem.objectives) > 1 else ()
+            # what is undefined is level
+            found[goal.label] = (0.0,) if UNDEFINED in there.notes else in_pieces or (there.value,)
+    of_samples = _samples_near(problem, context, sampled)
+    for goal in problem.constraints:
+        near, more = measured[goal.label].near, of_samples.get(goal.label, ())
+        if near is not None and more is not None:
+            found[goal.label] = slack_pieces(goal, near(context)) + more
+    return found
+
+
+def _samples_near(
+    problem: Problem, context: Context, sampled: _Sampled
+) -> dict[str, tuple[float, ...] | None]:
+    """As ``_Sampled.pieces`` next to the design; None where it is not known."""
+    goals = {goal.label: goal for goal in problem.constraints}
+    machines = _Machines(problem, context)
+    found: dict[str, tuple[float, ...] | None] = {}
+    for sample, judged in zip(problem.samples, sampled.measured, strict=False):
+        goal, before = goals[sample.label], found.get(sample.label, ())
+        slacks: tuple[float, ...] | None = (-UNDEFINED_VIOLATION * goal.metric.scale,)
+        if judged:
+            slacks = _sample_near(goal, sample, judged, machines.of(sample))
+        found[sample.label] = None if before is None or slacks is None else before + slacks
+    return found
+
+
+def _sample_near(
+    goal: Goal, sample: Sample, judged: Sequence[Measurement], machine: Context | str
+) -> tuple[float, ...] | None:
+    if isinstance(machine, str) or any(measurement.near is None for measurement in judged):
+        return None
+    seen: list[Measurement] = []
+    for measurement in judged:
+        region = _pose_region(machine, sample.pose) if seen and sample.pose is not None else machine.region
+        if measurement.near is not None:
+            seen.append(measurement.near(replace(machine, region=region)))
+    return _sample_slacks(goal, sample, seen)
 
 
 def _offset_context(

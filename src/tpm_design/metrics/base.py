@@ -46,7 +46,8 @@ class Measurement:
     and ``full_slack`` replaces the slack of a constraint that asks for the full score 1 (coverage).
     ``pieces``: values whose least (of a metric to be large) or greatest is ``value``, or the pieces of
     ``full_slack``: smoother in the design than their minimum. ``notes`` are extra columns, such as which
-    locus was nearest.
+    locus was nearest. ``near(context)``: the measurement of a neighbouring design, exact to first order,
+    taken where this one's extremes are; a value that is not known so is NaN, ``near`` None where nothing is.
     """
 
     value: float
@@ -55,11 +56,12 @@ class Measurement:
     full_slack: float | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
     pieces: tuple[float, ...] = ()
+    near: Callable[[Context], Measurement] | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def undefined(cls, reason: str) -> Measurement:
-        """No value: the design is infeasible for the stated reason."""
-        return cls(float("nan"), notes={UNDEFINED: reason})
+        """No value: the design is infeasible for the stated reason, and so are its neighbours."""
+        return cls(float("nan"), notes={UNDEFINED: reason}, near=lambda _: cls.undefined(reason))
 
 
 def never_refused(kind: MechanismKind, limits: Mapping[str, Any]) -> str | None:

@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from tpm_design.metrics.base import Measurement, Metric, of_positions
 from tpm_design.metrics.context import Context
+from tpm_design.metrics.following import (
+    extreme_measurement,
+    out_of_reach,
+    pieces_of,
+    reach_shortfall,
+    sides_of,
+    span_measurement,
+)
 from tpm_design.workspace.indices import CLEARANCE, LEGS, SERIAL, Index
 
 SEARCH = "search along the region's normals, then sliding along the locus, ARCHITECTURE.md"
@@ -15,12 +24,12 @@ SEARCH = "search along the region's normals, then sliding along the locus, ARCHI
 def _locus_distance(name: str) -> Callable[[Context, Mapping[str, Any]], Measurement]:
     def compute(context: Context, options: Mapping[str, Any]) -> Measurement:
         if not context.reachable:
-            return Measurement(context.reach.value, context.reach.error, notes={"locus": "out of reach"})
+            return replace(reach_shortfall(context), notes={"locus": "out of reach"})
         if name not in context.mechanism.kind.determinants:
-            return Measurement(context.size.value, context.size.error, notes={"locus": "none"})
+            return replace(span_measurement(context, context.size), notes={"locus": "none"})
         found = context.locus_distance(context.mechanism.kind.determinants.index(name))
         if found.pose is None:
-            return Measurement(context.size.value, context.size.error, notes={"locus": "none"})
+            return replace(span_measurement(context, context.size), notes={"locus": "none"})
         return Measurement(found.value, found.error, notes={"locus": name})
 
     return compute
@@ -28,26 +37,33 @@ def _locus_distance(name: str) -> Callable[[Context, Mapping[str, Any]], Measure
 
 def _boundary_distance(context: Context, options: Mapping[str, Any]) -> Measurement:
     if not context.reachable:
-        return Measurement(context.reach.value, context.reach.error)
+        return reach_shortfall(context)
     # the leg margins are the distances to the shells, so their least value is the distance to the nearest
-    legs = context.least(Index(LEGS))
-    return Measurement(legs.value, legs.error, pieces=legs.pieces)
+    return extreme_measurement(context, Index(LEGS))
 
 
 def _singularity_margin_min(context: Context, options: Mapping[str, Any]) -> Measurement:
     if not context.reachable:
-        return Measurement(0.0, 0.0, depth=context.reach.value / context.mechanism.reach_radius())
+        return out_of_reach(context)
     serial = context.least(Index(SERIAL))
     margins = [(serial.value, serial.error), *((side.margin, side.error) for side in context.sides)]
     value, error = min(margins)
+    of_serial, of_sides = pieces_of(context, Index(SERIAL), serial), sides_of(context)
+
+    def near(other: Context) -> Measurement:
+        return _margin(min(float(of_serial(other).min()), float(of_sides(other).min())), error)
+
+    return replace(_margin(value, error), near=near)
+
+
+def _margin(value: float, error: float) -> Measurement:
     return Measurement(max(0.0, value), error, depth=min(0.0, value))
 
 
 def _link_clearance(context: Context, options: Mapping[str, Any]) -> Measurement:
     if not context.reachable:
         return Measurement.undefined("the region is not reachable")
-    extreme = context.least(Index(CLEARANCE))
-    return Measurement(extreme.value, extreme.error, pieces=extreme.pieces)
+    return extreme_measurement(context, Index(CLEARANCE))
 
 
 def _distance(name: str, condition: str) -> Metric:

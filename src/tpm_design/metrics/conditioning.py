@@ -10,6 +10,7 @@ import numpy as np
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.metrics.base import Measurement, Metric, Option
 from tpm_design.metrics.context import Context
+from tpm_design.metrics.following import extreme_measurement, out_of_reach, singular
 from tpm_design.workspace.averages import GAUSS_NODES, Averages, conditioning_averages
 from tpm_design.workspace.indices import CONDITION_2, CONDITION_FROBENIUS, Index, index_values
 from tpm_design.workspace.region_geometry import POINTS
@@ -61,12 +62,11 @@ def _minimum(context: Context, options: Mapping[str, Any]) -> Measurement:
         return Measurement(fine.least, abs(fine.least - coarse.least))
     if not context.reachable:
         # unreachable poses count as singular; the reach shortfall guides a search back
-        return Measurement(0.0, depth=context.reach.value / context.mechanism.reach_radius())
-    worst = context.side_driven_by(options["drive"]).margin
-    if worst <= 0.0:
-        return Measurement(0.0, depth=worst)
-    extreme = context.least(_index(context, options))
-    return Measurement(extreme.value, extreme.error, pieces=extreme.pieces)
+        return out_of_reach(context)
+    worst = context.side_driven_by(options["drive"])
+    if worst.margin <= 0.0:
+        return singular(context, worst)
+    return extreme_measurement(context, _index(context, options))
 
 
 def _at_points(context: Context, options: Mapping[str, Any]) -> np.ndarray:

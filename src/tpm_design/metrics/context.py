@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,11 +27,26 @@ SURVEY_RAYS_PER_SAMPLE = 1.4
 @dataclass(frozen=True)
 class Sides:
     """For one determinant over the region: ``margin`` its least value on the side it mostly keeps
-    (negative where it changes sign), with ``error`` and the ``pieces`` of it."""
+    (negative where it changes sign), with ``error`` and the ``pieces`` of it; ``index`` and ``extreme``: what
+    it is the extreme of."""
 
     margin: float
     error: float
     pieces: tuple[float, ...]
+    index: Index
+    extreme: Extreme
+
+
+@dataclass(frozen=True)
+class Span:
+    """``value``: greatest less least value of an ``index`` over the region, with its ``error``; the ``least``
+    and ``greatest`` are attained at poses of their own."""
+
+    value: float
+    error: float
+    index: Index
+    least: Extreme
+    greatest: Extreme
 
 
 @dataclass(frozen=True)
@@ -90,7 +106,7 @@ class Context:
         nearest = min(folds, key=lambda fold: fold.value, default=None)
         if nearest is None or nearest.value >= found.value:
             return replace(found, pieces=pieces)
-        return Extreme(nearest.value, found.error, nearest.pose, pieces)
+        return replace(found, value=nearest.value, pose=nearest.pose, pieces=pieces)
 
     @property
     def reachable(self) -> bool:
@@ -114,8 +130,14 @@ class Context:
         signs = self.lattice_sides
         indices = [Index(DETERMINANT, part=part, sign=sign) for part, sign in enumerate(signs)]
         return tuple(
-            Sides(sign * found.value, found.error, tuple(sign * piece for piece in found.pieces))
-            for sign, found in zip(signs, self.extremes(*indices), strict=True)
+            Sides(
+                index.sign * found.value,
+                found.error,
+                tuple(index.sign * piece for piece in found.pieces),
+                index,
+                found,
+            )
+            for index, found in zip(indices, self.extremes(*indices), strict=True)
         )
 
     def side_driven_by(self, drive: str) -> Sides:
@@ -149,16 +171,20 @@ class Context:
             limit=2.0 * self.mechanism.reach_radius(),
         )
 
-    @cached_property
-    def size(self) -> Extreme:
-        """Longest side (m) of the bounding box of the joint centres over the region."""
-        ends = [Index(EXTENT, part=axis, sign=sign) for sign in (1.0, -1.0) for axis in range(3)]
+    def widest(self, indices: Sequence[Index]) -> Span:
+        """Of several indices the greatest difference between its extremes over the region."""
+        ends = [index._replace(sign=sign) for sign in (1.0, -1.0) for index in indices]
         found = self.extremes(*ends)
-        sides = [
-            Extreme(high.value - low.value, high.error + low.error, high.pose, ())
-            for low, high in zip(found[:3], found[3:], strict=True)
+        spans = [
+            Span(high.value - low.value, high.error + low.error, index, low, high)
+            for index, low, high in zip(indices, found[: len(indices)], found[len(indices) :], strict=True)
         ]
-        return max(sides, key=lambda side: side.value)
+        return max(spans, key=lambda span: (span.value, span.error))
+
+    @cached_property
+    def size(self) -> Span:
+        """Longest side (m) of the bounding box of the joint centres over the region."""
+        return self.widest([Index(EXTENT, part=axis) for axis in range(3)])
 
     def mode_rays(self, margin: float, *, sided: bool) -> tuple[RayField, RayField]:
         """Ray fields of the whole mode at the working order and at a coarser one."""

@@ -8,6 +8,7 @@ from typing import Any
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.metrics.base import Measurement, Metric, Option, of_positions
 from tpm_design.metrics.context import Context
+from tpm_design.metrics.following import extreme_measurement
 from tpm_design.workspace.indices import FASTEST, SENSITIVITY, SLOWEST, TRANSMISSION, Index
 
 DRIVE = Option("drive", "choice", "actuators: motors or joints", default="motor", choices=("motor", "joint"))
@@ -27,8 +28,7 @@ def _no_transmission(kind: MechanismKind, limits: Mapping[str, Any]) -> str | No
 def _transmission(context: Context, options: Mapping[str, Any]) -> Measurement:
     if not context.reachable:
         return Measurement.undefined("the region is not reachable")
-    found = context.least(Index(TRANSMISSION))
-    return Measurement(found.value, found.error, pieces=found.pieces)
+    return extreme_measurement(context, Index(TRANSMISSION))
 
 
 def _extreme(quantity: int, sign: float) -> Callable[[Context, Mapping[str, Any]], Measurement]:
@@ -38,8 +38,7 @@ def _extreme(quantity: int, sign: float) -> Callable[[Context, Mapping[str, Any]
         if sign < 0.0 and context.side_driven_by(options["drive"]).margin <= 0.0:
             return Measurement.undefined("unbounded: a singularity cuts the region")
         motor = context.mechanism.motor_weight(options["drive"])
-        found = context.least(Index(quantity, motor=motor, sign=sign))
-        return Measurement(found.value, found.error, pieces=found.pieces)
+        return extreme_measurement(context, Index(quantity, motor=motor, sign=sign))
 
     return compute
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from tpm_design.metrics.base import Measurement, Metric, Option
 from tpm_design.metrics.context import Context
+from tpm_design.metrics.following import span_measurement
 from tpm_design.workspace.extents import field_extent
 from tpm_design.workspace.indices import ACTUATOR, Index
 
@@ -16,7 +17,9 @@ SOURCE = "by definition"
 
 
 def _total_link_length(context: Context, options: Mapping[str, Any]) -> Measurement:
-    return Measurement(context.mechanism.total_link_length())
+    return Measurement(
+        context.mechanism.total_link_length(), near=lambda other: _total_link_length(other, options)
+    )
 
 
 def _robot_size(context: Context, options: Mapping[str, Any]) -> Measurement:
@@ -29,7 +32,7 @@ def _robot_size(context: Context, options: Mapping[str, Any]) -> Measurement:
         return Measurement(fine, abs(fine - coarse) if coarse is not None else fine)
     if not context.reachable:
         return Measurement.undefined("the region is not reachable")
-    return Measurement(context.size.value, context.size.error)
+    return span_measurement(context, context.size)
 
 
 def _actuator_range(context: Context, options: Mapping[str, Any]) -> Measurement:
@@ -37,13 +40,8 @@ def _actuator_range(context: Context, options: Mapping[str, Any]) -> Measurement
         return Measurement.undefined("the region is not reachable")
     motor = context.mechanism.motor_weight(options["drive"])
     count = context.mechanism.kind.limb_count
-    ends = [Index(ACTUATOR, part=p, motor=motor, sign=sign) for sign in (1.0, -1.0) for p in range(count)]
-    found = context.extremes(*ends)
-    travels = [
-        (high.value - low.value, high.error + low.error)
-        for low, high in zip(found[:count], found[count:], strict=True)
-    ]
-    return Measurement(*max(travels))
+    travel = context.widest([Index(ACTUATOR, part=part, motor=motor) for part in range(count)])
+    return span_measurement(context, travel)
 
 
 METRICS = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from tpm_design.metrics.base import Measurement, Metric, Option, of_positions
 from tpm_design.metrics.context import Context
+from tpm_design.metrics.following import reach_of, sides_of
 from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.region_geometry import POINTS
 from tpm_design.workspace.volume import selected_volume
@@ -55,12 +57,21 @@ def _coverage(context: Context, options: Mapping[str, Any]) -> Measurement:
     reach = tuple(piece / length for piece in context.reach.pieces)
     pieces = (*reach, *(piece for side in context.sides for piece in side.pieces))
     worst = min(pieces)
+    of_reach, of_sides = reach_of(context), sides_of(context)
+
+    def near(other: Context) -> Measurement:
+        shares = of_reach(other) / other.mechanism.reach_radius()
+        values = np.concatenate([shares, of_sides(other).ravel()])
+        share = 1.0 if worst >= 0.0 else math.nan
+        return Measurement(share, full_slack=float(values.min()), pieces=tuple(values.tolist()))
+
     if worst >= 0.0:
-        return Measurement(1.0, 0.0, full_slack=worst, pieces=pieces)
+        return Measurement(1.0, 0.0, full_slack=worst, pieces=pieces, near=near)
     fine, coarse = _point_shares(context) if context.placed.form == POINTS else _solid_shares(context)
     # what the samples' polish found outside is smaller than the rays resolve
     share = min(fine, 1.0 - RESOLUTION)
-    return Measurement(share, max(abs(fine - coarse), RESOLUTION), full_slack=worst, pieces=pieces)
+    error = max(abs(fine - coarse), RESOLUTION)
+    return Measurement(share, error, full_slack=worst, pieces=pieces, near=near)
 
 
 RESOLUTION = 1e-6

@@ -22,11 +22,21 @@ class Stalled(Exception):  # noqa: N818 - an ordinary end of a search, not an er
 
 
 @dataclass(frozen=True)
+class Slopes:
+    """At one point: ``gradient`` (n,) of the objective and ``jacobian`` (m, n) of the constraints, per unit
+    of the cube, 0 along discrete variables."""
+
+    gradient: FloatArray
+    jacobian: FloatArray
+
+
+@dataclass(frozen=True)
 class Outcomes:
     """Values at N points: ``objective`` (N,) to minimise, ``constraints`` (N, m) met where ≥ 0 (each
     divided by its metric's scale), ``merit`` (N,) = objective + exact penalty, finite everywhere.
     ``aborted`` (N,), or empty for none: points that a ``ScreeningSearch`` did not measure to the end. What is
     not known of them is 0 of a constraint, and their merit is behind those that were asked for.
+    ``slopes``: of a ``SlopedSearch``, None at points where they were not asked for or are not known.
     Of a ``FrontSearch``: ``objectives`` (N, k), all of them, each to minimise, and ``objective_pieces``: for
     each of them an array (N, s) whose greatest value it is, smoother in the design."""
 
@@ -36,6 +46,17 @@ class Outcomes:
     aborted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     objectives: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     objective_pieces: tuple[FloatArray, ...] = ()
+    slopes: tuple[Slopes | None, ...] = ()
+
+    def part(self, rows: slice) -> Outcomes:
+        """Those of some of the points, of one objective."""
+        return Outcomes(
+            self.objective[rows],
+            self.constraints[rows],
+            self.merit[rows],
+            self.aborted[rows],
+            slopes=self.slopes[rows],
+        )
 
 
 class Search(Protocol):
@@ -66,6 +87,16 @@ class ScreeningSearch(Search, Protocol):
     def screen(self, points: FloatArray, keep: int) -> Outcomes:
         """As ``evaluate``; only the ``keep`` best of ``points``, by violation and then by objective, are sure
         to be measured to the end. Raises BudgetSpent."""
+        ...
+
+
+@runtime_checkable
+class SlopedSearch(Search, Protocol):
+    """A search that may know slopes."""
+
+    def evaluate_sloped(self, points: FloatArray, sloped: NDArray[np.bool_]) -> Outcomes:
+        """As ``evaluate``, with the slopes at those of the points (N,), which cost less than an evaluation
+        and do not count as one. Raises BudgetSpent."""
         ...
 
 

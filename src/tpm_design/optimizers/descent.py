@@ -1,6 +1,6 @@
 """A local search that asks for its points in batches: sequential quadratic programming in a trust region.
 
-A descent is a generator: it yields points and is sent their outcomes. So several of them go on in step, each
+A descent is a generator: it yields questions and is sent the outcomes. So several of them go on in step, each
 round of their points one batch, without threads.
 """
 
@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.optimizers.base import FloatArray, Outcomes
+from tpm_design.optimizers.base import FloatArray, Outcomes, Slopes
 from tpm_design.optimizers.cuts import Cuts, cuts_near
 from tpm_design.optimizers.measure import FIRST_PENALTY, INSIDE, Measure
-from tpm_design.optimizers.places import Place, looked_at
+from tpm_design.optimizers.places import Place, Question, looked_at
 from tpm_design.optimizers.quadratic import Program, Step, elastic_step
 
 FINE = 1e-6
@@ -59,9 +59,8 @@ INWARD = (2.0, 6.0, 18.0, 54.0)
 
 MOST_STEPS = 200
 
-Slopes = tuple[FloatArray, FloatArray]
-Walk = Generator[FloatArray, Outcomes, "Landing"]
-"""Yields points (N, n), is sent their outcomes, returns where it landed."""
+Walk = Generator[Question, Outcomes, "Landing"]
+"""Yields questions, is sent their outcomes, returns where it landed."""
 
 
 @dataclass(frozen=True)
@@ -111,8 +110,8 @@ def descend(
     """Walk downhill from ``start`` in the variables ``free`` (their numbers), the others held.
 
     ``radius``: of the first trust region; ``fine``: of the last. ``abandoned``: asked at every new place
-    whether to give up. ``steps``: at most. ``blur``: differences are taken over this share of the last step,
-    at most its square.
+    whether to give up. ``steps``: at most. ``blur``: where slopes are not known, differences are taken over
+    this share of the last step, at most its square.
 
     Sources: R. Fletcher, Practical methods of optimization, 1987, 14.4 (exact penalty in a trust region,
     correction of second order); M. J. D. Powell, 1978 (damped update of the curvature).
@@ -148,7 +147,7 @@ class _Descent:
 
     def run(self, abandoned: Callable[[Place], bool], steps: int) -> Walk:
         measure = self._measure
-        self._gradient, self._jacobian = yield from self._slopes(self._here)
+        self._gradient, self._jacobian = yield from self._slopes_here()
         self._curvature *= measure.follow(self._here, self._gradient, self._jacobian)
         for _ in range(steps):
             cuts = cuts_near(self._here, self._free, self._seen, measure, self._radius)
@@ -219,7 +218,7 @@ class _Descent:
 
     def _corrected(
         self, program: Program, trial: Place, step: Step
-    ) -> Generator[FloatArray, Outcomes, tuple[Place, Step]]:
+    ) -> Generator[Question, Outcomes, tuple[Place, Step]]:
         """The better of a step and another that aims at the constraints as the first one found them."""
         measure, count = self._measure, len(trial.constraints)
         found = program.constraints.copy()
@@ -233,23 +232,24 @@ class _Descent:
         better = measure.gain(self._here, again) > measure.gain(self._here, trial)
         return (again, second) if better else (trial, step)
 
-    def _stay(self, trial: Place, step: Step) -> Generator[FloatArray, Outcomes, None]:
+    def _stay(self, trial: Place, step: Step) -> Generator[Question, Outcomes, None]:
         """Shrink the trust region, and look closer at what was mistaken."""
         length = float(np.abs(step.step).max())
         self._failures += 1
-        if self._failures > 1 and length < KINKED and self._measure.shortfall(trial) > step.shortfall:
+        kinked = self._failures > 1 and length < KINKED
+        if (trial.slopes or kinked) and self._measure.shortfall(trial) > step.shortfall:
             width, self._width = self._width, self._difference(length)
-            _, beyond = yield from self._slopes(trial)
+            beyond = yield from self._slopes(trial)
             self._width = width
-            self._seen.append((trial, beyond))
+            self._seen.append((trial, beyond.jacobian))
         self._radius = SHRINKING * min(self._radius, max(length, 0.1 * FINE))
-        if self._width > FINEST_DIFFERENCE and FINE < self._radius < 30.0 * self._width:
+        if self._here.slopes is None and FINE < self._radius < 30.0 * self._width > 30.0 * FINEST_DIFFERENCE:
             self._width = self._difference(self._radius)
-            self._gradient, self._jacobian = yield from self._slopes(self._here)
+            self._gradient, self._jacobian = yield from self._slopes_here()
 
     def _move(
         self, trial: Place, length: float, multipliers: FloatArray
-    ) -> Generator[FloatArray, Outcomes, None]:
+    ) -> Generator[Question, Outcomes, None]:
         """Take a step, and update what is known of the slopes."""
         measure, here = self._measure, self._here
         multipliers = multipliers * measure.weights / measure.height
@@ -257,13 +257,13 @@ class _Descent:
         self._failures = 0
         self._seen = [*self._seen, (here, self._jacobian)][-REMEMBERED:]
         self._here, self._width = trial, self._difference(length)
-        self._gradient, self._jacobian = yield from self._slopes(trial)
+        self._gradient, self._jacobian = yield from self._slopes_here()
         turned = self._gradient - self._jacobian.T @ multipliers - slope
         way = trial.point[self._free] - here.point[self._free]
         self._curvature = _updated(self._curvature, way, turned * measure.height)
         self._curvature *= measure.follow(trial, self._gradient, self._jacobian)
 
-    def _step_inside(self) -> Generator[FloatArray, Outcomes, None]:
+    def _step_inside(self) -> Generator[Question, Outcomes, None]:
         """Kinks are often reached from outside: step inside, a little further each time."""
         shortfall = self._measure.shortfall(self._here)
         if not 0.0 < shortfall < NEARLY_MET:
@@ -287,21 +287,28 @@ class _Descent:
         program = self._program(none)
         return Landing(self._best, self._here, program, measure.weights, measure.height, measure.penalty)
 
-    def _look(self, step: FloatArray) -> Generator[FloatArray, Outcomes, Place]:
+    def _look(self, step: FloatArray) -> Generator[Question, Outcomes, Place]:
         place = yield from looked_at(_moved(self._here.point, self._free, step))
         self._check(place.constraints)
         return place
 
-    def _slopes(self, place: Place) -> Generator[FloatArray, Outcomes, Slopes]:
-        """Gradient (n,) and Jacobian (m, n) by difference quotients, towards the middle of the cube."""
+    def _slopes_here(self) -> Generator[Question, Outcomes, tuple[FloatArray, FloatArray]]:
+        found = yield from self._slopes(self._here)
+        return found.gradient, found.jacobian
+
+    def _slopes(self, place: Place) -> Generator[Question, Outcomes, Slopes]:
+        """In the free variables: those that are known, else difference quotients, towards the middle of the
+        cube."""
         free, each = self._free, np.arange(len(self._free))
+        if place.slopes is not None:
+            return Slopes(place.slopes.gradient[free], place.slopes.jacobian[:, free])
         points = np.tile(place.point, (len(free), 1))
         points[each, free] += np.where(place.point[free] > 0.5, -self._width, self._width)
         steps = points[each, free] - place.point[free]
-        found = yield points
+        found = yield Question(points)
         self._check(found.constraints[0])
         gradient = (found.objective - place.objective) / steps
-        return gradient, ((found.constraints - place.constraints) / steps[:, None]).T
+        return Slopes(gradient, ((found.constraints - place.constraints) / steps[:, None]).T)
 
     def _difference(self, step: float) -> float:
         return float(np.clip(self._blur * step, FINEST_DIFFERENCE, self._blur**2))

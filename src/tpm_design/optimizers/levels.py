@@ -7,7 +7,7 @@ from itertools import combinations, product
 import numpy as np
 
 from tpm_design.optimizers.descent import Landing, Walk, descend
-from tpm_design.optimizers.places import looked_at, places
+from tpm_design.optimizers.places import Question, looked_at, places
 from tpm_design.optimizers.starts import Choice, Levels, choice_of
 
 FEW_LEVELS = 4
@@ -37,7 +37,7 @@ def descend_levels(landing: Landing, levels: Levels) -> Walk:
             return landing
         points = np.tile(landing.place.point, (len(options), 1))
         points[:, discrete] = (np.array(options) + 0.5) / levels[discrete]
-        found = places(points, (yield points))
+        found = places(points, (yield Question(points)))
         if len(found[0].constraints) != len(landing.weights):
             landing = yield from descend(landing.place, free, RADIUS)
         guesses = [landing.guess(place, free, GUESSED) for place in found]

@@ -12,7 +12,7 @@ import numpy as np
 from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer, Outcomes, Search
 from tpm_design.optimizers.descent import BLURRED, SHARP, Landing, descend
 from tpm_design.optimizers.levels import descend_levels
-from tpm_design.optimizers.places import Place, looked_at, places
+from tpm_design.optimizers.places import Place, Question, answered, looked_at, places
 from tpm_design.optimizers.starts import Starts, are_one, choice_of
 from tpm_design.optimizers.watch import Watch
 
@@ -59,7 +59,7 @@ ON_THE_WAY = (0.1, 0.5, 0.9)
 ENUMERATED = 4096
 """Number of designs, where all variables are discrete, up to which each is evaluated in the end."""
 
-Task = Generator[FloatArray, Outcomes, None]
+Task = Generator[Question, Outcomes, None]
 
 
 @runtime_checkable
@@ -100,15 +100,15 @@ def multistart(search: Search, seed: int) -> str:
 
 
 class _UnderWay:
-    """A task, the points it waits for, and the best feasible place it saw."""
+    """A task, the question it waits for, and the best feasible place it saw."""
 
-    def __init__(self, task: Task, asked: FloatArray) -> None:
+    def __init__(self, task: Task, asked: Question) -> None:
         self._task, self.asked, self.over = task, asked, False
         self.best: Place | None = None
 
     def go_on(self, found: Outcomes) -> None:
-        """Hand over the outcomes and wait for the next points."""
-        for place in places(self.asked, found):
+        """Hand over the outcomes and wait for the next question."""
+        for place in places(self.asked.points, found):
             if place.violation == 0.0 and (self.best is None or place.before(self.best)):
                 self.best = place
         try:
@@ -139,12 +139,9 @@ class _Course:
                 task = self._next_task()
                 if (first := next(task, None)) is not None:
                     under_way.append(_UnderWay(task, first))
-            found = self._evaluated(np.vstack([one.asked for one in under_way]))
-            place = 0
-            for one in under_way:
-                part = slice(place, place + len(one.asked))
-                place += len(one.asked)
-                one.go_on(Outcomes(found.objective[part], found.constraints[part], found.merit[part]))
+            found = self._answered([one.asked for one in under_way])
+            for one, outcomes in zip(under_way, found, strict=True):
+                one.go_on(outcomes)
             self._left = [*self._left, *(one.best for one in under_way if one.over and one.best)]
             under_way = [one for one in under_way if not one.over]
         if self._designs <= ENUMERATED:
@@ -153,14 +150,14 @@ class _Course:
         hits = sum(optimum.hits for optimum in self._best_ones())
         return f"Converged: {hits} of {self._landed} independent local searches ended at the best objective."
 
-    def _evaluated(self, points: FloatArray) -> Outcomes:
+    def _answered(self, questions: list[Question]) -> list[Outcomes]:
         """Outcomes with the constraints in pieces: in more of them once a design has more."""
-        found = self._pieces.evaluate(points)
+        found = answered(self._pieces, questions)
         if isinstance(self._search, PiecewiseSearch):
             pieces = self._search.in_pieces()
             if pieces.constraint_count != self._pieces.constraint_count:
                 self._pieces = Watch(pieces)
-                found = self._pieces.evaluate(points)
+                found = answered(self._pieces, questions)
         return found
 
     # ------------------------------------------------------------------------------ what is begun
@@ -204,9 +201,7 @@ class _Course:
         landing = yield from self._descended(start, 0.5 * RADIUS, BLURRED)
         yield from self._arrived(landing, independent=False)
 
-    def _descended(
-        self, start: Place, radius: float, blur: float
-    ) -> Generator[FloatArray, Outcomes, Landing]:
+    def _descended(self, start: Place, radius: float, blur: float) -> Generator[Question, Outcomes, Landing]:
         landing = yield from descend(start, self._free, radius, self._known, COARSE, COARSE_STEPS, blur)
         if not len(self._free):
             landing = yield from descend_levels(landing, self._levels)
@@ -260,7 +255,7 @@ class _Course:
                 known.landing, known.finished = landing, False
         self._tell()
 
-    def _downhill(self, place: Place) -> Generator[FloatArray, Outcomes, Optimum | None]:
+    def _downhill(self, place: Place) -> Generator[Question, Outcomes, Optimum | None]:
         """The nearest optimum that is as good, if the straight way there never leads uphill."""
         others = [o for o in self._optima if self._alike(o.place, place)]
         others.sort(key=lambda o: float(np.abs(o.place.point - place.point).max()))
@@ -269,7 +264,7 @@ class _Course:
             way = ends[0].point - ends[1].point
             points = ends[1].point + np.array(ON_THE_WAY)[:, None] * way
             allowed = ends[1].objective + EQUAL * 0.1 * abs(ends[1].objective)
-            found = places(points, (yield points))
+            found = places(points, (yield Question(points)))
             if all(step.violation <= 1e-6 and step.objective <= allowed for step in found):
                 return other
         return None

@@ -39,15 +39,15 @@ def _on_objective(opt: Any, watch: Watch) -> None:
     def objective(x: FloatArray, gradient: FloatArray) -> float:
         if not gradient.size:
             return watch.objective(x)
-        slopes = watch.slopes(x)
-        gradient[:] = slopes.gradient
-        return slopes.objective
+        tangents = watch.tangents(x)
+        gradient[:] = tangents.slopes.gradient
+        return tangents.objective
 
     def constraints(result: FloatArray, x: FloatArray, jacobian: FloatArray) -> None:
         if jacobian.size:
-            slopes = watch.slopes(x)
-            jacobian[:] = -slopes.jacobian
-            result[:] = -slopes.constraints
+            tangents = watch.tangents(x)
+            jacobian[:] = -tangents.slopes.jacobian
+            result[:] = -tangents.constraints
         else:
             result[:] = -watch.constraints(x)
 

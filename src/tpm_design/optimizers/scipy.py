@@ -123,7 +123,7 @@ def slsqp(watch: Watch, seed: int) -> str:
         constraints = {
             "type": "ineq",
             "fun": watch.constraints,
-            "jac": lambda x: watch.slopes(x).jacobian,
+            "jac": lambda x: watch.tangents(x).slopes.jacobian,
         }
     return _minimize(
         watch,
@@ -131,7 +131,7 @@ def slsqp(watch: Watch, seed: int) -> str:
         "SLSQP",
         {"ftol": 1e-12, "maxiter": NO_LIMIT},
         constraints=constraints,
-        jac=lambda x: watch.slopes(x).gradient,
+        jac=lambda x: watch.tangents(x).slopes.gradient,
     )
 
 
@@ -187,7 +187,7 @@ def trust_constr(watch: Watch, seed: int) -> str:
     constraints: Any = ()
     if watch.constraint_count:
         constraints = NonlinearConstraint(
-            watch.constraints, 0.0, np.inf, jac=lambda x: watch.slopes(x).jacobian, hess=Curvature()
+            watch.constraints, 0.0, np.inf, jac=lambda x: watch.tangents(x).slopes.jacobian, hess=Curvature()
         )
     options = {
         "initial_tr_radius": LOCAL_STEP,
@@ -203,7 +203,7 @@ def trust_constr(watch: Watch, seed: int) -> str:
         "trust-constr",
         options,
         constraints=constraints,
-        jac=lambda x: watch.slopes(x).gradient,
+        jac=lambda x: watch.tangents(x).slopes.gradient,
         hess=Curvature(),
     )
 

@@ -10,9 +10,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tpm_design.errors import RefusedError
-from tpm_design.optimizers.base import FloatArray, FrontSearch, Outcomes, ScreeningSearch, Search, Stalled
+from tpm_design.optimizers.base import (
+    FloatArray,
+    FrontSearch,
+    Outcomes,
+    ScreeningSearch,
+    Search,
+    SlopedSearch,
+    Slopes,
+    Stalled,
+)
 
 LOCAL_STEP = 0.05
 """First step of local methods, as a share of each variable's range: chosen on constrained problems in seven
@@ -34,14 +44,12 @@ method without an end of its own would never stop on a problem with discrete var
 
 
 @dataclass(frozen=True)
-class Slopes:
-    """Values and gradients at one point: ``objective`` and its ``gradient`` (n,), ``constraints`` (m,)
-    and their ``jacobian`` (m, n), per unit of the cube."""
+class Tangents:
+    """Values and slopes at one point: ``objective``, ``constraints`` (m,)."""
 
     objective: float
-    gradient: FloatArray
     constraints: FloatArray
-    jacobian: FloatArray
+    slopes: Slopes
 
 
 class Watch:
@@ -63,6 +71,13 @@ class Watch:
         Raises whatever ended the search first, again at every later call.
         """
         return self._asked(points, self.search.evaluate)
+
+    def evaluate_sloped(self, points: FloatArray, sloped: NDArray[np.bool_]) -> Outcomes:
+        """As ``evaluate``, with the slopes at those of the points (N,), where the search knows them."""
+        search = self.search
+        if not isinstance(search, SlopedSearch):
+            return self.evaluate(points)
+        return self._asked(points, lambda inside: search.evaluate_sloped(inside, sloped))
 
     def screen(self, points: FloatArray, keep: int) -> Outcomes:
         """As ``evaluate``, the ``keep`` best of them to the end; all where the search cannot screen."""
@@ -98,12 +113,16 @@ class Watch:
         constraints: FloatArray = self.evaluate(point[None, :]).constraints[0]
         return constraints
 
-    def slopes(self, point: FloatArray) -> Slopes:
-        """Values and gradients at one point (n,) from one batch of 2 n + 1 points in the cube.
+    def tangents(self, point: FloatArray) -> Tangents:
+        """Values and slopes at one point (n,), where the search does not know slopes from one batch of
+        2 n + 1 points in the cube.
 
         Difference quotients over ± ``DIFFERENCE_STEP``: central, one-sided where a bound is nearer.
         """
         middle = np.clip(point, 0.0, 1.0)
+        found = self.evaluate_sloped(middle[None, :], np.ones(1, dtype=np.bool_))
+        if found.slopes and found.slopes[0] is not None:
+            return Tangents(float(found.objective[0]), found.constraints[0], found.slopes[0])
         size = self.dimension
         above = np.minimum(middle + DIFFERENCE_STEP, 1.0)
         below = np.maximum(middle - DIFFERENCE_STEP, 0.0)
@@ -114,12 +133,9 @@ class Watch:
         values = self.evaluate(stencil)
         width = above - below
         objective, constraints = values.objective, values.constraints
-        return Slopes(
-            objective=float(objective[0]),
-            gradient=(objective[1 : 1 + size] - objective[1 + size :]) / width,
-            constraints=constraints[0],
-            jacobian=((constraints[1 : 1 + size] - constraints[1 + size :]) / width[:, None]).T,
-        )
+        gradient = (objective[1 : 1 + size] - objective[1 + size :]) / width
+        jacobian = ((constraints[1 : 1 + size] - constraints[1 + size :]) / width[:, None]).T
+        return Tangents(float(objective[0]), constraints[0], Slopes(gradient, jacobian))
 
     def see_pieces(self) -> None:
         """From here on constraints and objectives in as many pieces as a known point has of each."""

@@ -133,6 +133,8 @@ def entry_to_json(entry: Entry) -> dict[str, Any]:
     cutoff = data.pop("cutoff")
     if cutoff is not None:
         data["cutoff"] = asdict(cutoff)
+    if data["slopes"] is None:
+        del data["slopes"]
     judged_by = {"judged_by": entry.judged_by} if entry.judged_by else {}
     return {"id": entry.number, "round": entry.round, **judged_by, **data}
 
@@ -145,6 +147,8 @@ def entry_from_json(data: Mapping[str, Any]) -> Entry:
         fields[key] = {k: math.nan if v is None else v for k, v in fields[key].items()}
     fields["cutoff"] = None if fields.get("cutoff") is None else Cutoff(**fields["cutoff"])
     fields["pieces"] = {label: tuple(values) for label, values in fields["pieces"].items()}
+    if "slopes" in fields:
+        fields["slopes"] = {label: tuple(map(tuple, rows)) for label, rows in fields["slopes"].items()}
     round_number, judged_by = int(data.get("round", 1)), str(data.get("judged_by", ""))
     return Entry(int(data["id"]), Evaluation(**fields), round_number, judged_by)
 

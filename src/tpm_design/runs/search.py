@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.design_space import DesignSpace
-from tpm_design.optimizers.base import BudgetSpent, Outcomes
+from tpm_design.optimizers.base import BudgetSpent, Outcomes, Slopes
 from tpm_design.problem import (
     Cutoff,
     Design,
     Evaluation,
     Goal,
+    Neighbour,
+    Neighbours,
     Problem,
     Sample,
     evaluate,
@@ -49,6 +51,9 @@ scaled objectives and constraints have, so that the penalised optimum is the con
 BACKOFF = 1e-6
 """Share of its metric's scale by which an optimiser sees each constraint tightened: active-set methods end
 a rounding outside their constraints, and a result must lie inside."""
+
+SLOPE_STEP = 1e-7
+"""Share of each range that slopes are differences over: of smooth functions, so that it may be small."""
 
 FAILED = 1e6
 """Objective and shortfall given to an optimiser for a design that could not be measured."""
@@ -105,37 +110,55 @@ class EvaluationLog:
             self._executor.close()
 
     def evaluations(
-        self, designs: Sequence[Design], limit: int, cutoff: Cutoff | None = None
+        self,
+        designs: Sequence[Design],
+        limit: int,
+        cutoff: Cutoff | None = None,
+        neighbours: Sequence[Neighbours | None] = (),
     ) -> list[Evaluation]:
         """Evaluations of the designs, in order; repeated ones are answered from the log, an aborted one only
-        where ``cutoff`` would abort it as well: else it becomes another entry.
+        where ``cutoff`` would abort it as well: else it becomes another entry. ``neighbours``: those of each
+        design, None where its slopes are not asked for; slopes alone make no other entry.
 
         Raises BudgetSpent once the log holds ``limit`` entries and another is needed; what fits is
         evaluated and logged first.
         """
         keys = [design_key(design) for design in designs]
+        asked = {key: around for key, around in zip(keys, neighbours, strict=False) if around is not None}
         fresh: dict[Key, Design] = {}
+        unsloped: dict[Key, Design] = {}
         for key, design in zip(keys, designs, strict=True):
-            if not self._is_known(key, cutoff) and key not in fresh:
-                fresh[key] = design
+            if not self._is_known(key, cutoff):
+                fresh.setdefault(key, design)
+            elif key in asked and self.entries[self._places[key]].evaluation.slopes is None:
+                unsloped[key] = design
         allowed = max(0, limit - len(self.entries))
         wanted = list(fresh.items())[:allowed]
-        answers = [self._answer(key, cutoff) for key, _ in wanted]
-        unanswered = [design for (_, design), answer in zip(wanted, answers, strict=True) if answer is None]
-        measured = partial(evaluate, cutoff=cutoff)
-        with closing(self._executor.as_they_end(measured, self.problem, unanswered)) as evaluated:
+        answers = [self._answer(key, cutoff, sloped=key in asked) for key, _ in wanted]
+        questions = [
+            _Question(design, asked.get(key))
+            for (key, design), answer in zip(wanted, answers, strict=True)
+            if answer is None
+        ] + [_Question(design, asked[key]) for key, design in unsloped.items()]
+        measured = partial(_answered, cutoff=cutoff)
+        with closing(self._executor.as_they_end(measured, self.problem, questions)) as evaluated:
             results = in_order(evaluated)
             for (key, _), answer in zip(wanted, answers, strict=True):
-                result = answer or next(results)
-                self._places[key] = len(self.entries)
-                entry = Entry(self.first + len(self.entries), result, self.round_number, self.judged_by)
-                self.entries.append(entry)
-                for label, pieces in result.pieces.items():
-                    self.most_pieces[label] = max(len(pieces), self.most_pieces.get(label, 1))
-                self._record(entry)
+                self._append(key, answer or next(results))
+            for key, result in zip(unsloped, results, strict=True):
+                place = self._places[key]
+                self.entries[place] = replace(self.entries[place], evaluation=result)
         if len(wanted) < len(fresh):
             raise BudgetSpent
         return [self.entries[self._places[key]].evaluation for key in keys]
+
+    def _append(self, key: Key, result: Evaluation) -> None:
+        self._places[key] = len(self.entries)
+        entry = Entry(self.first + len(self.entries), result, self.round_number, self.judged_by)
+        self.entries.append(entry)
+        for label, pieces in result.pieces.items():
+            self.most_pieces[label] = max(len(pieces), self.most_pieces.get(label, 1))
+        self._record(entry)
 
     def _is_known(self, key: Key, cutoff: Cutoff | None) -> bool:
         if key not in self._places:
@@ -143,11 +166,11 @@ class EvaluationLog:
         known = self.entries[self._places[key]].evaluation
         return known.cutoff is None or (cutoff is not None and is_worse(self.problem, known, cutoff))
 
-    def _answer(self, key: Key, cutoff: Cutoff | None) -> Evaluation | None:
+    def _answer(self, key: Key, cutoff: Cutoff | None, *, sloped: bool) -> Evaluation | None:
         """What an evaluation would give, if it is stored."""
         whole = self._answers.get((self.judged_by, key, None))
         if cutoff is None:
-            return whole
+            return None if whole is not None and sloped and whole.slopes is None else whole
         # one that is worse may have been measured to the end for other reasons
         sure = whole is not None and not is_worse(self.problem, whole, cutoff)
         return whole if sure else self._answers.get((self.judged_by, key, cutoff))
@@ -159,6 +182,18 @@ class EvaluationLog:
     def rank(self, entry: Entry) -> tuple[float, float, int]:
         """As ``rank``."""
         return rank(self.problem, entry)
+
+
+@dataclass(frozen=True)
+class _Question:
+    """A design, and the neighbours along which its slopes are asked for, None for none."""
+
+    design: Design
+    neighbours: Neighbours | None
+
+
+def _answered(problem: Problem, question: _Question, cutoff: Cutoff | None) -> Evaluation:
+    return evaluate(problem, question.design, cutoff, question.neighbours)
 
 
 @dataclass(frozen=True)
@@ -194,6 +229,34 @@ class UnitSearch:
         table = np.atleast_2d(np.asarray(points, dtype=np.float64))
         results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
         return outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
+
+    def evaluate_sloped(self, points: FloatArray, sloped: NDArray[np.bool_]) -> Outcomes:
+        """As ``SlopedSearch``."""
+        table = np.atleast_2d(np.asarray(points, dtype=np.float64))
+        designs = [self.space.design(point) for point in table]
+        around = [
+            self._neighbours(point) if asked else None for point, asked in zip(table, sloped, strict=True)
+        ]
+        results = self.log.evaluations(designs, self.limit, neighbours=around)
+        found = outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
+        continuous = [number for number, count in enumerate(self.levels) if count == 0]
+        return replace(
+            found,
+            slopes=tuple(
+                slopes_of(self.log.problem, result, self.sizes, continuous, self.dimension) if asked else None
+                for result, asked in zip(results, sloped, strict=True)
+            ),
+        )
+
+    def _neighbours(self, point: FloatArray) -> Neighbours:
+        """One along each continuous variable, towards the middle of the cube."""
+        found = []
+        for number, count in enumerate(self.levels):
+            if count == 0:
+                moved = point.copy()
+                moved[number] += -SLOPE_STEP if point[number] > 0.5 else SLOPE_STEP
+                found.append(Neighbour(self.space.design(moved), float(moved[number] - point[number])))
+        return tuple(found)
 
     def screen(self, points: FloatArray, keep: int) -> Outcomes:
         """As ``ScreeningSearch``. The cutoff of each ``SCREENED`` points is the best ``keep``-th of those
@@ -353,6 +416,30 @@ def outcomes(
     aborted = np.array([result.cutoff is not None for result in results], dtype=np.bool_)
     merit = np.where(aborted, FAILED, objective) + PENALTY * violation
     return Outcomes(objective, constraints, merit, aborted, objectives=objectives, objective_pieces=pieces)
+
+
+def slopes_of(
+    problem: Problem, result: Evaluation, sizes: Sequence[int], continuous: Sequence[int], dimension: int
+) -> Slopes | None:
+    """Of the objective and of constraints in so many pieces, as ``outcomes`` gives them; None where one is
+    not known."""
+    goal, known = problem.objectives[0], result.slopes
+    labels = (goal.label, *(constraint.label for constraint in problem.constraints))
+    if known is None or any(label not in known for label in labels):
+        return None
+    gradient = np.zeros(dimension)
+    sign = (1.0 if goal.sense == "minimize" else -1.0) / goal.metric.scale
+    gradient[continuous] = sign * np.array(known[goal.label][0])
+    jacobian = np.zeros((sum(sizes), dimension))
+    first = 0
+    for constraint, size in zip(problem.constraints, sizes, strict=True):
+        rows = np.array(known[constraint.label]) / constraint.metric.scale
+        pieces = result.pieces[constraint.label]
+        if len(pieces) != size:
+            rows = rows[int(np.argmin(pieces))]
+        jacobian[first : first + size, continuous] = rows
+        first += size
+    return Slopes(gradient, jacobian)
 
 
 def _objective_pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.arithmetic import inner, kernel
+from tpm_design.arithmetic import inner, kernel, short_kernel
 from tpm_design.workspace.indices import Index, index_value, values_at
 from tpm_design.workspace.region_geometry import POINTS, PlacedRegion, nearest, surface_frame
 
@@ -23,12 +23,14 @@ ERROR_FLOOR = 1e-10
 class Extreme:
     """``value`` in the index's unit, ``error``: what half the samples would have missed plus the polish's
     last gains, ``pose`` (3,) in metres where it is attained. ``pieces``: the extremes found from each eighth
-    of the region, whose least (or greatest) is ``value``: smoother in the design than their minimum."""
+    of the region, whose least (or greatest) is ``value``: smoother in the design than their minimum.
+    ``piece_poses`` (P, 3): where they are attained."""
 
     value: float
     error: float
     pose: tuple[float, float, float]
     pieces: tuple[float, ...]
+    piece_poses: NDArray[np.float64] = field(compare=False)
 
 
 @inner
@@ -81,7 +83,7 @@ def _best_of_eighths(region, points, values, stride):  # type: ignore[no-untyped
 def _polished(geometry, mode, region, index, points, values, spacing):  # type: ignore[no-untyped-def]
     """As ``_least``, of a solid region: polished from the best pose of each eighth, and from the best of
     every second pose alone where that is another one."""
-    pieces = np.full(EIGHTHS, math.inf)
+    pieces, poses = np.full(EIGHTHS, math.inf), np.empty((EIGHTHS, 3))
     before = np.full(EIGHTHS, -1, np.int64)
     value, gain, pose = math.inf, 0.0, (points[0, 0], points[0, 1], points[0, 2])
     halved = math.inf
@@ -101,6 +103,7 @@ def _polished(geometry, mode, region, index, points, values, spacing):  # type: 
                     value, gain, pose = found, last, (x, y, z)
                 if stride == 1:
                     pieces[eighth] = found
+                    poses[eighth, 0], poses[eighth, 1], poses[eighth, 2] = x, y, z
                 else:
                     halved = min(halved, found)
             before[eighth] = n
@@ -108,15 +111,17 @@ def _polished(geometry, mode, region, index, points, values, spacing):  # type: 
     for eighth in range(EIGHTHS):
         if not math.isfinite(pieces[eighth]):
             pieces[eighth] = value
+            poses[eighth, 0], poses[eighth, 1], poses[eighth, 2] = pose
         if pieces[eighth] < pieces[least]:
             least = eighth
     pieces[least] = value
-    return value, halved - value + gain, pose, pieces
+    poses[least, 0], poses[least, 1], poses[least, 2] = pose
+    return value, halved - value + gain, pose, pieces, poses
 
 
 @inner
 def _least(geometry, mode, region, index, points, spacing):  # type: ignore[no-untyped-def]
-    """Value, error, pose and pieces (8,) of ``Extreme``, the index's sign still on them."""
+    """Value, error, pose, pieces (8,) and their poses of ``Extreme``, the index's sign still on them."""
     values = values_at(geometry, mode, index, points)
     if region.form != POINTS:
         return _polished(geometry, mode, region, index, points, values, spacing)
@@ -124,17 +129,22 @@ def _least(geometry, mode, region, index, points, spacing):  # type: ignore[no-u
     for other in range(values.size):
         if values[other] < values[n]:
             n = other
-    return values[n], 0.0, (points[n, 0], points[n, 1], points[n, 2]), np.full(EIGHTHS, values[n])
+    poses = np.empty((EIGHTHS, 3))
+    for eighth in range(EIGHTHS):
+        for axis in range(3):
+            poses[eighth, axis] = points[n, axis]
+    return values[n], 0.0, (points[n, 0], points[n, 1], points[n, 2]), np.full(EIGHTHS, values[n]), poses
 
 
 @kernel
 def _extremes(geometry, mode, region, indices, points, spacing):  # type: ignore[no-untyped-def]
-    """One row for each row of ``indices`` (quantity, part, motor, sign): value, error, pose, pieces."""
-    out = np.empty((indices.shape[0], 5 + EIGHTHS))
+    """One row for each row of ``indices`` (quantity, part, motor, sign): value, error, pose, pieces, and the
+    pose of each of these."""
+    out = np.empty((indices.shape[0], 5 + 4 * EIGHTHS))
     for k in range(indices.shape[0]):
         sign = indices[k, 3]
         index = Index(int(indices[k, 0]), int(indices[k, 1]), indices[k, 2], sign)
-        value, error, pose, pieces = _least(geometry, mode, region, index, points, spacing)
+        value, error, pose, pieces, poses = _least(geometry, mode, region, index, points, spacing)
         # shrinks with the lattice, so that a finer look at the same pose never contradicts a coarser one
         longest = 2.0 * max(region.half)
         floor = ERROR_FLOOR * abs(value) * (min(1.0, spacing / longest) if longest > 0.0 else 1.0)
@@ -143,6 +153,22 @@ def _extremes(geometry, mode, region, indices, points, spacing):  # type: ignore
             out[k, 2 + axis] = pose[axis]
         for eighth in range(EIGHTHS):
             out[k, 5 + eighth] = sign * pieces[eighth]
+            for axis in range(3):
+                out[k, 5 + EIGHTHS + 3 * eighth + axis] = poses[eighth, axis]
+    return out
+
+
+@short_kernel
+def _at_poses(geometry, mode, indices, poses):  # type: ignore[no-untyped-def]
+    """The index of each row of ``indices`` at its poses (K, P, 3)."""
+    out = np.empty(poses.shape[:2])
+    for k in range(indices.shape[0]):
+        sign = indices[k, 3]
+        index = Index(int(indices[k, 0]), int(indices[k, 1]), indices[k, 2], sign)
+        for n in range(poses.shape[1]):
+            out[k, n] = sign * index_value(
+                geometry, mode, index, poses[k, n, 0], poses[k, n, 1], poses[k, n, 2]
+            )
     return out
 
 
@@ -159,5 +185,17 @@ def extremes_over_region(
     ``points`` (N, 3): the region's lattice; ``spacing`` (m) between its poses.
     """
     table = np.array(indices, dtype=np.float64).reshape(-1, 4)
-    rows = _extremes(geometry, signs, region, table, points, spacing).tolist()
-    return tuple(Extreme(row[0], row[1], (row[2], row[3], row[4]), tuple(row[5:])) for row in rows)
+    rows = _extremes(geometry, signs, region, table, points, spacing)
+    poses = rows[:, 5 + EIGHTHS :].reshape(-1, EIGHTHS, 3)
+    return tuple(
+        Extreme(row[0], row[1], (row[2], row[3], row[4]), tuple(row[5 : 5 + EIGHTHS]), where)
+        for row, where in zip(rows.tolist(), poses, strict=True)
+    )
+
+
+def values_at_poses(
+    geometry: object, signs: object, indices: Sequence[Index], poses: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Each index at its own ``poses`` (K, P, 3): (K, P), in the index's unit."""
+    table = np.array(indices, dtype=np.float64).reshape(-1, 4)
+    return np.asarray(_at_poses(geometry, signs, table, np.ascontiguousarray(poses)))

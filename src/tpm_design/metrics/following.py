@@ -1,0 +1,122 @@
+"""Extremes of one design seen in its neighbours: at the poses where the design has them.
+
+At a pose where a value is least over the region it changes, to first order, as it does at that pose held
+fixed (J. M. Danskin, The theory of max-min, 1966). Poses move with the region's centre.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpm_design.metrics.base import Measurement
+from tpm_design.metrics.context import Context, Sides, Span
+from tpm_design.workspace.extremes import Extreme, values_at_poses
+from tpm_design.workspace.fold_clearance import fold_clearance
+from tpm_design.workspace.indices import REACH, Index
+
+Values = Callable[[Context], NDArray[np.float64]]
+"""Of a neighbouring design."""
+
+
+def pieces_of(context: Context, index: Index, extreme: Extreme) -> Values:
+    """The pieces (P,) of one extreme."""
+    values = _at(context, (index,), extreme.piece_poses[None, :, :])
+    return lambda other: values(other)[0]
+
+
+def reach_of(context: Context) -> Values:
+    """The pieces of ``Context.reach``."""
+    values = pieces_of(context, Index(REACH), context.reach)
+
+    def near(other: Context) -> NDArray[np.float64]:
+        folds = [fold_clearance(other.placed, line).value for line in other.mechanism.fold_lines()]
+        return np.concatenate([values(other), folds])
+
+    return near
+
+
+def sides_of(context: Context) -> Values:
+    """The pieces (D, P) of ``Context.sides``."""
+    sides = context.sides
+    signs = np.array([side.index.sign for side in sides])
+    poses = np.array([side.extreme.piece_poses for side in sides])
+    values = _at(context, [side.index for side in sides], poses)
+    return lambda other: signs[:, None] * values(other)
+
+
+def span_of(context: Context, span: Span) -> Callable[[Context], float]:
+    """The difference between two extremes of an index."""
+    ends = [span.index._replace(sign=sign) for sign in (1.0, -1.0)]
+    values = _at(context, ends, np.array([[span.least.pose], [span.greatest.pose]]))
+
+    def near(other: Context) -> float:
+        least, greatest = values(other)[:, 0].tolist()
+        return float(greatest - least)
+
+    return near
+
+
+def extreme_measurement(context: Context, index: Index) -> Measurement:
+    """The least value of an index over the region (the greatest for sign −1)."""
+    found = context.least(index)
+    pieces = pieces_of(context, index, found)
+
+    def near(other: Context) -> Measurement:
+        return _of_pieces(pieces(other), found, index.sign)
+
+    return Measurement(found.value, found.error, pieces=found.pieces, near=near)
+
+
+def span_measurement(context: Context, span: Span) -> Measurement:
+    """The difference between two extremes."""
+    value = span_of(context, span)
+    return Measurement(span.value, span.error, near=lambda other: Measurement(value(other), span.error))
+
+
+def out_of_reach(context: Context) -> Measurement:
+    """0, and how far the region is out of reach, as a share of the machine's radius."""
+    pieces = reach_of(context)
+
+    def near(other: Context) -> Measurement:
+        return Measurement(0.0, depth=float(pieces(other).min()) / other.mechanism.reach_radius())
+
+    return Measurement(0.0, depth=context.reach.value / context.mechanism.reach_radius(), near=near)
+
+
+def reach_shortfall(context: Context) -> Measurement:
+    """How far the region is out of reach (m, negative)."""
+    found, pieces = context.reach, reach_of(context)
+
+    def near(other: Context) -> Measurement:
+        return Measurement(float(pieces(other).min()), found.error)
+
+    return Measurement(found.value, found.error, near=near)
+
+
+def singular(context: Context, side: Sides) -> Measurement:
+    """0, and how far a determinant is beyond 0 somewhere in the region."""
+    pieces = pieces_of(context, side.index, side.extreme)
+
+    def near(other: Context) -> Measurement:
+        return Measurement(0.0, depth=float((side.index.sign * pieces(other)).min()))
+
+    return Measurement(0.0, depth=side.margin, near=near)
+
+
+def _of_pieces(pieces: NDArray[np.float64], found: Extreme, sign: float) -> Measurement:
+    value = float(pieces.min() if sign > 0.0 else pieces.max())
+    return Measurement(value, found.error, pieces=tuple(pieces.tolist()))
+
+
+def _at(context: Context, indices: Sequence[Index], poses: NDArray[np.float64]) -> Values:
+    """Each index at its own poses (K, P, 3)."""
+    offsets = poses - np.array(context.placed.centre)
+
+    def near(other: Context) -> NDArray[np.float64]:
+        moved = offsets + np.array(other.placed.centre)
+        return values_at_poses(other.mechanism.geometry, other.mode.signs, indices, moved)
+
+    return near
