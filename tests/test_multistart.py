@@ -6,7 +6,6 @@ import csv
 import itertools
 import json
 import shutil
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 

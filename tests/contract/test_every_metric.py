@@ -13,7 +13,7 @@ from tpm_design.mechanisms import MECHANISMS
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.metrics import METRICS
 from tpm_design.metrics.base import UNDEFINED, Metric
-from tpm_design.problem import Design, Evaluation, Goal, Problem, design_context, evaluate
+from tpm_design.problem import Design, Evaluation, Goal, Neighbour, Problem, design_context, evaluate
 from tpm_design.units import Units, unit_for
 from tpm_design.workspace.regions import Box, Tilt
 
@@ -129,3 +129,59 @@ def test_out_of_reach_is_said_or_measured_never_nan_in_silence(kind: MechanismKi
         result = evaluate(problem_of(kind, constraints=(bounded,)), design_at(kind, FAR))
         assert math.isfinite(result.violation)
         assert (result.violation > 0.0) == (UNDEFINED in measurement.notes), metric.name
+
+
+WITHOUT_SLOPES = {"conditioning_mean", "conditioning_share", "all_round_tilt"}
+SLOPE_STEP, DIFFERENCE = 1e-7, 2e-5
+
+
+def changed(design: Design, name: str, by: float) -> Design:
+    return {**design, name: float(design[name]) + by}
+
+
+def near_good(kind: MechanismKind, seed: int) -> Design:
+    """A design near the example whose limbs' symmetry does not show: there extremes have kinks."""
+    random = np.random.default_rng(seed)
+    design = dict(design_at(kind, 1.0))
+    for name in kind.example:
+        design[name] = float(design[name]) * random.uniform(0.98, 1.02)
+    for name in kind.centre_names:
+        design[name] = float(design[name]) + 0.02 * random.uniform(-1.0, 1.0)
+    return design
+
+
+def bounded(goal: Goal, value: float) -> Goal:
+    """A constraint on it that is met by 1; coverage is asked for in full."""
+    minimum = 1.0 if goal.metric.name == "coverage" else value - 1.0
+    return Goal(goal.metric, goal.label, goal.options, minimum=minimum)
+
+
+def test_slopes_are_derivatives_of_the_metric(kind: MechanismKind) -> None:
+    """Where differences to both sides agree, so that there is no kink, the slope agrees with them."""
+    goals = [goal_of(metric, kind) for metric in meaningful(kind)]
+    checked = dict.fromkeys((goal.label for goal in goals), 0)
+    for seed in range(2):
+        design = near_good(kind, seed)
+        values = evaluate(problem_of(kind, *goals), design).metrics
+        problem = problem_of(kind, constraints=tuple(bounded(goal, values[goal.label]) for goal in goals))
+        names = [*kind.example, *kind.centre_names]
+        around = [Neighbour(changed(design, name, SLOPE_STEP), SLOPE_STEP) for name in names]
+        here = evaluate(problem, design, None, around)
+        assert here.slopes is not None
+        for number, name in enumerate(names):
+            below, above = (
+                evaluate(problem, changed(design, name, step)) for step in (-DIFFERENCE, DIFFERENCE)
+            )
+            for label, rows in here.slopes.items():
+                before, after = (
+                    (other.slacks[label] + other.errors[label] - here.slacks[label] - here.errors[label])
+                    / step
+                    for other, step in ((below, -DIFFERENCE), (above, DIFFERENCE))
+                )
+                size = max(1.0, abs(before), abs(after))
+                if abs(after - before) > 0.01 * size:
+                    continue
+                checked[label] += 1
+                slope = rows[int(np.argmin(here.pieces[label]))][number]
+                assert slope == pytest.approx(0.5 * (before + after), abs=0.01 * size), (label, name)
+    assert {label for label, count in checked.items() if count == 0} <= WITHOUT_SLOPES

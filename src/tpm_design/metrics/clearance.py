@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from tpm_design.metrics.base import Measurement, Metric, of_positions
 from tpm_design.metrics.context import Context
 from tpm_design.metrics.following import (
@@ -17,6 +19,9 @@ from tpm_design.metrics.following import (
     span_measurement,
 )
 from tpm_design.workspace.indices import CLEARANCE, LEGS, SERIAL, Index
+
+CROSSED = 1e-6
+"""Distance between the middles of links, as a share of the machine's radius, up to which they cross."""
 
 SEARCH = "search along the region's normals, then sliding along the locus, ARCHITECTURE.md"
 
@@ -63,7 +68,18 @@ def _margin(value: float, error: float) -> Measurement:
 def _link_clearance(context: Context, options: Mapping[str, Any]) -> Measurement:
     if not context.reachable:
         return Measurement.undefined("the region is not reachable")
-    return extreme_measurement(context, Index(CLEARANCE))
+    index = Index(CLEARANCE)
+    found = context.least(index)
+    pieces = pieces_of(context, index, found)
+    # links that cross are 0 apart, and so they are in every neighbouring design
+    apart = np.array(found.pieces) + 2.0 * context.mechanism.geometry.link_radius
+    crossed = apart < CROSSED * context.mechanism.reach_radius()
+
+    def near(other: Context) -> Measurement:
+        values = np.where(crossed, found.pieces, pieces(other))
+        return Measurement(float(values.min()), found.error, pieces=tuple(values.tolist()))
+
+    return Measurement(found.value, found.error, pieces=found.pieces, near=near)
 
 
 def _distance(name: str, condition: str) -> Metric:
