@@ -24,6 +24,7 @@ MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__
 ROOMS = (
     "errors",
     "units",
+    "worker_threads",
     "checker",
     "arithmetic",
     "mechanisms",
@@ -46,6 +47,7 @@ ROOMS = (
 ONLY = {
     "errors": set(),
     "units": set(),
+    "worker_threads": set(),
     "checker": {"errors"},
     "arithmetic": {"errors"},
     "optimizers": {"errors"},

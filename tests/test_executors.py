@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
 import pickle
+import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -21,10 +24,11 @@ from tpm_design.errors import RefusedError, RunStoppedError
 from tpm_design.mechanisms import MECHANISMS
 from tpm_design.problem import Problem, evaluate
 from tpm_design.runs.dask_workers import CHUNK_SECONDS, HANDLING_SECONDS, DaskWorkers
-from tpm_design.runs.executors import AHEAD, SWITCH_INTERVAL, Threads, in_order
+from tpm_design.runs.executors import SWITCH_INTERVAL, Threads, in_order
 from tpm_design.runs.shipping import carried_out, packed, portable, unpacked
 from tpm_design.study import load_comparison, load_study
 from tpm_design.study.design import choose_design
+from tpm_design.worker_threads import AHEAD
 
 STUDIES = sorted((Path(__file__).parents[1] / "studies").glob("*.yaml"))
 
@@ -65,6 +69,31 @@ def test_threads_share_the_interpreter_often_until_they_are_closed() -> None:
             assert sys.getswitchinterval() == pytest.approx(0.004)
     finally:
         sys.setswitchinterval(before)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
+def test_interrupts_at_any_moment_break_no_thread() -> None:
+    program = Path(__file__).with_name("interrupted_threads.py")
+    done = subprocess.run(
+        [sys.executable, program, "600", "1"], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_no_task_is_under_way_when_its_results_are_closed(problem: Problem) -> None:
+    running: set[int] = set()
+
+    def task(_: Problem, item: int) -> None:
+        running.add(item)
+        time.sleep(0.002)
+        running.discard(item)
+
+    with closing(Threads(3)) as pool:
+        for ends_after in range(1, 6):
+            with closing(pool.as_they_end(task, problem, range(100))) as results:
+                for _ in range(ends_after):
+                    next(results)
+            assert running == set()
 
 
 def test_what_a_task_raises_reaches_whoever_asks(problem: Problem) -> None:
