@@ -7,14 +7,17 @@ worker, or the interpreter, has to say of interrupts that went astray.
 from __future__ import annotations
 
 import faulthandler
+import itertools
 import random
 import signal
 import sys
 import time
+from collections.abc import Generator
 from contextlib import closing
 from typing import Any, NoReturn, cast
 
 from tpm_design.runs.executors import Threads
+from tpm_design.worker_threads import in_a_thread
 
 LONGEST, LONGEST_BETWEEN = 2e-3, 3e-4
 """Seconds until the first interrupt, which may be before the threads have begun, and to the second one, which
@@ -55,14 +58,25 @@ def endless() -> NoReturn:
                     assert result == place * place
 
 
+def endless_elsewhere() -> None:
+    """Numbers that another thread counts, until an interrupt comes."""
+    with closing(in_a_thread(counted())) as numbers:
+        for expected, number in enumerate(numbers):
+            assert number == expected
+
+
+def counted() -> Generator[int]:
+    yield from itertools.count()
+
+
 def main(times: int, seed: int) -> None:
     moments = Moments(seed)
-    for _ in range(times):
+    for number in range(times):
         faulthandler.dump_traceback_later(SECONDS_TO_HANG, exit=True)
         try:
             try:
                 moments.draw()
-                endless()
+                endless_elsewhere() if number % 3 == 0 else endless()
             finally:
                 while moments.left:
                     time.sleep(1e-5)

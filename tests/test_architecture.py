@@ -48,7 +48,7 @@ ONLY = {
     "errors": set(),
     "units": set(),
     "worker_threads": set(),
-    "checker": {"errors"},
+    "checker": {"errors", "worker_threads"},
     "arithmetic": {"errors"},
     "optimizers": {"errors"},
     "design_space": {"problem"},

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import closing
 from dataclasses import replace
 from importlib.metadata import version
@@ -28,7 +28,7 @@ from tpm_design.runs.executors import SWITCH_INTERVAL, Threads, in_order
 from tpm_design.runs.shipping import carried_out, packed, portable, unpacked
 from tpm_design.study import load_comparison, load_study
 from tpm_design.study.design import choose_design
-from tpm_design.worker_threads import AHEAD
+from tpm_design.worker_threads import AHEAD, in_a_thread
 
 STUDIES = sorted((Path(__file__).parents[1] / "studies").glob("*.yaml"))
 
@@ -94,6 +94,29 @@ def test_no_task_is_under_way_when_its_results_are_closed(problem: Problem) -> N
                 for _ in range(ends_after):
                     next(results)
             assert running == set()
+
+
+def test_what_another_thread_carries_out_comes_in_step_with_whoever_asks() -> None:
+    threads, closed = set(), []
+
+    def counted(stop: int) -> Generator[int]:
+        try:
+            for number in range(stop):
+                threads.add(threading.get_ident())
+                yield number
+            raise ZeroDivisionError
+        finally:
+            closed.append(stop)
+
+    with closing(in_a_thread(number for number in [1, 2, 3])) as results:
+        assert list(results) == [1, 2, 3]
+    with closing(in_a_thread(counted(100))) as results:
+        assert [next(results) for _ in range(3)] == [0, 1, 2]
+        assert closed == []
+    assert closed == [100]
+    with closing(in_a_thread(counted(2))) as results, pytest.raises(ZeroDivisionError):
+        list(results)
+    assert threading.get_ident() not in threads
 
 
 def test_what_a_task_raises_reaches_whoever_asks(problem: Problem) -> None:

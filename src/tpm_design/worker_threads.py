@@ -14,7 +14,7 @@ from _thread import start_new_thread
 from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from queue import Empty, SimpleQueue
-from typing import Generic, TypeVar
+from typing import Generic, NoReturn, TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -82,7 +82,7 @@ class _Batch(Generic[Item, Result]):
 
     def __init__(self, task: Callable[[Item], Result]) -> None:
         self._task = task
-        self._ended: SimpleQueue[Callable[[], tuple[int, Result]]] = SimpleQueue()
+        self._ended: SimpleQueue[tuple[int, Callable[[], Result]]] = SimpleQueue()
         self._running: set[int] = set()
         self._is_dropped = False
 
@@ -90,14 +90,15 @@ class _Batch(Generic[Item, Result]):
         """By a worker: never raises."""
         # first this, then a look: a drop in between waits for this item, or it is not begun
         self._running.add(place)
-        outcome = None if self._is_dropped else _outcome(self._task, place, item)
+        outcome = None if self._is_dropped else _outcome(partial(self._task, item))
         self._running.discard(place)
         if outcome is not None:
-            self._ended.put(outcome)
+            self._ended.put((place, outcome))
 
     def next_result(self) -> tuple[int, Result]:
         """By whoever asks: wait for one more. Raises what the task raised."""
-        return self._ended.get()()
+        place, outcome = self._ended.get()
+        return place, outcome()
 
     def drop(self) -> None:
         """By whoever asks: let nothing more begin, and wait for what has."""
@@ -105,19 +106,58 @@ class _Batch(Generic[Item, Result]):
         _wait_until_empty(self._running)
 
 
-def _outcome(task: Callable[[Item], Result], place: int, item: Item) -> Callable[[], tuple[int, Result]]:
-    """Gives the place and the task's result, or raises what the task raised."""
+def in_a_thread(results: Generator[Result]) -> Generator[Result]:
+    """What ``results`` gives, carried out by a thread of its own while the one that asks waits: for libraries
+    whose waiting an interrupt would break.
+
+    Raises what it raised. Once this is closed, so is ``results``; a second Ctrl-C ends that wait.
+    """
+    asked: SimpleQueue[bool] = SimpleQueue()
+    given: SimpleQueue[Callable[[], Result | _End]] = SimpleQueue()
+    present = {0}
+    start_new_thread(_give, (results, asked, given, present))
     try:
-        return partial(_returned, place, task(item))
+        asked.put(True)
+        while not isinstance(result := given.get()(), _End):
+            yield result
+            asked.put(True)
+    finally:
+        asked.put(False)
+        _wait_until_empty(present)
+
+
+class _End:
+    """Nothing more is given."""
+
+
+def _give(
+    results: Generator[Result],
+    asked: SimpleQueue[bool],
+    given: SimpleQueue[Callable[[], Result | _End]],
+    present: set[int],
+) -> None:
+    """What a thread does for ``in_a_thread``."""
+    try:
+        while asked.get():
+            given.put(_outcome(partial(next, results, _End())))
+        results.close()
+    finally:
+        present.clear()
+
+
+def _outcome(call: Callable[[], Result]) -> Callable[[], Result]:
+    """Gives what the call gave, or raises what it raised."""
+    try:
+        return partial(_same, call())
     except BaseException as error:
         return partial(_raised, error)
 
 
-def _returned(place: int, result: Result) -> tuple[int, Result]:
-    return place, result
+def _same(result: Result) -> Result:
+    return result
 
 
-def _raised(error: BaseException) -> tuple[int, Result]:
+def _raised(error: BaseException) -> NoReturn:
     raise error
 
 
