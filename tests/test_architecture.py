@@ -24,6 +24,7 @@ MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__
 ROOMS = (
     "errors",
     "units",
+    "worker_threads",
     "checker",
     "arithmetic",
     "mechanisms",
@@ -46,7 +47,8 @@ ROOMS = (
 ONLY = {
     "errors": set(),
     "units": set(),
-    "checker": {"errors"},
+    "worker_threads": set(),
+    "checker": {"errors", "worker_threads"},
     "arithmetic": {"errors"},
     "optimizers": {"errors"},
     "design_space": {"problem"},

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import os
 import pickle
+import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Generator, Iterator
 from contextlib import closing
 from dataclasses import replace
 from importlib.metadata import version
@@ -21,10 +24,11 @@ from tpm_design.errors import RefusedError, RunStoppedError
 from tpm_design.mechanisms import MECHANISMS
 from tpm_design.problem import Problem, evaluate
 from tpm_design.runs.dask_workers import CHUNK_SECONDS, HANDLING_SECONDS, DaskWorkers
-from tpm_design.runs.executors import AHEAD, SWITCH_INTERVAL, Threads, in_order
+from tpm_design.runs.executors import SWITCH_INTERVAL, Threads, in_order
 from tpm_design.runs.shipping import carried_out, packed, portable, unpacked
 from tpm_design.study import load_comparison, load_study
 from tpm_design.study.design import choose_design
+from tpm_design.worker_threads import AHEAD, in_a_thread
 
 STUDIES = sorted((Path(__file__).parents[1] / "studies").glob("*.yaml"))
 
@@ -65,6 +69,54 @@ def test_threads_share_the_interpreter_often_until_they_are_closed() -> None:
             assert sys.getswitchinterval() == pytest.approx(0.004)
     finally:
         sys.setswitchinterval(before)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
+def test_interrupts_at_any_moment_break_no_thread() -> None:
+    program = Path(__file__).with_name("interrupted_threads.py")
+    done = subprocess.run(
+        [sys.executable, program, "600", "1"], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_no_task_is_under_way_when_its_results_are_closed(problem: Problem) -> None:
+    running: set[int] = set()
+
+    def task(_: Problem, item: int) -> None:
+        running.add(item)
+        time.sleep(0.002)
+        running.discard(item)
+
+    with closing(Threads(3)) as pool:
+        for ends_after in range(1, 6):
+            with closing(pool.as_they_end(task, problem, range(100))) as results:
+                for _ in range(ends_after):
+                    next(results)
+            assert running == set()
+
+
+def test_what_another_thread_carries_out_comes_in_step_with_whoever_asks() -> None:
+    threads, closed = set(), []
+
+    def counted(stop: int) -> Generator[int]:
+        try:
+            for number in range(stop):
+                threads.add(threading.get_ident())
+                yield number
+            raise ZeroDivisionError
+        finally:
+            closed.append(stop)
+
+    with closing(in_a_thread(number for number in [1, 2, 3])) as results:
+        assert list(results) == [1, 2, 3]
+    with closing(in_a_thread(counted(100))) as results:
+        assert [next(results) for _ in range(3)] == [0, 1, 2]
+        assert closed == []
+    assert closed == [100]
+    with closing(in_a_thread(counted(2))) as results, pytest.raises(ZeroDivisionError):
+        list(results)
+    assert threading.get_ident() not in threads
 
 
 def test_what_a_task_raises_reaches_whoever_asks(problem: Problem) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 from tpm_design.arithmetic.rounding import check_rounding
@@ -16,6 +16,7 @@ from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Design, Goal, Problem, design_context
+from tpm_design.worker_threads import WorkerThreads
 
 Box = tuple[tuple[float, float], ...]
 
@@ -83,15 +84,13 @@ def verdict(
     if context.region is not None and distinct:
         # what the threads share is computed before they start
         _ = context.poses, context.lattice_sides
-    with ThreadPoolExecutor(max_workers=max(1, workers)) as pool:
-        settlements = tuple(
-            pool.map(
-                lambda demand: settle(
-                    problem, demand, context, tolerance, boxes=boxes, with_slack=with_slack
-                ),
-                distinct,
-            )
-        )
+
+    def settled(demand: Demand) -> Settlement:
+        return settle(problem, demand, context, tolerance, boxes=boxes, with_slack=with_slack)
+
+    with closing(WorkerThreads(workers)) as pool, closing(pool.as_they_end(settled, distinct)) as ending:
+        by_place = dict(ending)
+    settlements = tuple(by_place[place] for place in range(len(distinct)))
     numbers = {demand: number for number, demand in enumerate(distinct)}
     requirements = tuple(
         Requirement(goal, "undecided", None, (), None, need)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import heapq
 import signal
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import get_context
@@ -18,6 +19,7 @@ from tpm_design.checker.mechanisms.configuration import Machines
 from tpm_design.checker.proof import never_reached, proved
 from tpm_design.checker.regions import Box, Domain
 from tpm_design.checker.statements import Locus, Statement
+from tpm_design.worker_threads import in_a_thread
 
 SAMPLES = 16
 TOGETHER = 100
@@ -125,6 +127,11 @@ def _results(tasks: Iterable[Task], processes: int) -> Iterator[tuple[Task, int 
     if processes <= 1:
         yield from ((task, first_unproved(task)) for task in tasks)
         return
+    with closing(in_a_thread(_results_of_processes(tasks, processes))) as results:
+        yield from results
+
+
+def _results_of_processes(tasks: Iterable[Task], processes: int) -> Generator[tuple[Task, int | None]]:
     # started afresh, as everywhere but on Linux, so that nothing depends on what this process has loaded
     with ProcessPoolExecutor(processes, get_context("spawn"), _leave_interrupts) as pool:
         ahead: deque[tuple[Task, Future[int | None]]] = deque()

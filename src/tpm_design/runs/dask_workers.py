@@ -14,7 +14,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from itertools import accumulate
 from statistics import median
@@ -24,6 +24,7 @@ from tpm_design.errors import RunStoppedError, UsageError
 from tpm_design.problem import Problem
 from tpm_design.runs.executors import Item, Result
 from tpm_design.runs.shipping import carried_out, packed
+from tpm_design.worker_threads import in_a_thread
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -116,6 +117,14 @@ class DaskWorkers:
         self, task: Callable[[Problem, Item], Result], problem: Problem, items: Sequence[Item]
     ) -> Generator[tuple[int, Result]]:
         """As ``Executor``. ``task`` is a function that a module of this program holds by its name."""
+        with closing(in_a_thread(self._chunks_as_they_end(task, problem, items))) as chunks:
+            for first, results in chunks:
+                yield from enumerate(results, start=first)
+
+    def _chunks_as_they_end(
+        self, task: Callable[[Problem, Item], Result], problem: Problem, items: Sequence[Item]
+    ) -> Generator[tuple[int, list[Result]]]:
+        """The place of each chunk's first item, and the results."""
         from distributed import as_completed
 
         ended = as_completed(with_results=True, raise_errors=False, loop=self._client.loop)
@@ -137,7 +146,7 @@ class DaskWorkers:
                 for future, outcome in ended.next_batch():
                     results, seconds = _outcome(future, outcome)
                     self._means.append(seconds / len(results))
-                    yield from enumerate(results, start=firsts.pop(future))
+                    yield firsts.pop(future), results
         finally:
             if firsts:
                 # where the scheduler is gone there is nothing left to be dropped

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from functools import partial
 from typing import Protocol, TypeVar
 
 from tpm_design.problem import Problem
+from tpm_design.worker_threads import WorkerThreads
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-
-AHEAD = 2
-"""Items handed to the threads at a time, for each of them: what is written lags behind by no more."""
 
 SWITCH_INTERVAL = 1e-4
 """Seconds after which a thread lets others have the interpreter. Between short compiled calls of several
@@ -45,8 +43,7 @@ class Threads:
     another have the interpreter after ``SWITCH_INTERVAL``."""
 
     def __init__(self, workers: int) -> None:
-        self._workers = workers
-        self._pool = ThreadPoolExecutor(max_workers=workers) if workers > 1 else None
+        self._pool = WorkerThreads(workers)
         self._interval_before = sys.getswitchinterval()
         if workers > 1:
             sys.setswitchinterval(min(SWITCH_INTERVAL, self._interval_before))
@@ -54,40 +51,20 @@ class Threads:
     @property
     def workers(self) -> int:
         """As ``Executor``."""
-        return self._workers
+        return self._pool.count
 
     def as_they_end(
         self, task: Callable[[Problem, Item], Result], problem: Problem, items: Sequence[Item]
     ) -> Generator[tuple[int, Result]]:
         """As ``Executor``."""
-        if self._pool is None:
-            for place, item in enumerate(items):
-                yield place, task(problem, item)
-            return
-        places: dict[Future[Result], int] = {}
-        try:
-            for place, item in enumerate(items):
-                if len(places) >= AHEAD * self._workers:
-                    yield from _ended(places)
-                places[self._pool.submit(task, problem, item)] = place
-            while places:
-                yield from _ended(places)
-        finally:
-            for future in places:
-                future.cancel()
-            wait(places)
+        return self._pool.as_they_end(partial(task, problem), items)
 
     def close(self) -> None:
         """As ``Executor``."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
+        try:
+            self._pool.close()
+        finally:
             sys.setswitchinterval(self._interval_before)
-
-
-def _ended(places: dict[Future[Result], int]) -> Iterator[tuple[int, Result]]:
-    """Wait for at least one, and take what has ended."""
-    for future in wait(places, return_when=FIRST_COMPLETED).done:
-        yield places.pop(future), future.result()
 
 
 def in_order(results: Iterable[tuple[int, Result]]) -> Iterator[Result]:

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator
-from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import closing
 from dataclasses import dataclass
 
 from tpm_design.arithmetic.rounding import check_rounding
 from tpm_design.errors import ParameterError
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.worker_threads import WorkerThreads
 from tpm_design.workspace.paved_components import largest_part
 from tpm_design.workspace.paving import PavedSet, Paving
 from tpm_design.workspace.volume import VolumeKind, check_asked
@@ -83,33 +82,22 @@ def certified_volume(
     check_rounding()
     limits = Limits(boxes, float("inf") if seconds is None else began + seconds)
     octants = mechanism.single_octants(mode)
-    with _threads(threads) as executor:
+    with closing(WorkerThreads(threads)) as workers:
         if kind == "reachable":
             pavings = [Paving(PavedSet(mechanism, octant)) for octant in octants]
-            lower, upper = _sum(pavings, rtol, limits, executor)
+            lower, upper = _sum(pavings, rtol, limits, workers)
         else:
             sides = list(itertools.product((1.0, -1.0), repeat=len(mechanism.kind.determinants)))
             floor = max(margin, LEAST_MARGIN)
             pavings = [
                 Paving(PavedSet(mechanism, octant, signs, floor)) for octant in octants for signs in sides
             ]
-            lower, upper = _largest(pavings, rtol, limits, executor)
+            lower, upper = _largest(pavings, rtol, limits, workers)
     judged = sum(paving.boxes for paving in pavings)
     return CertifiedVolume(lower, upper, time.perf_counter() - began, judged)
 
 
-@contextmanager
-def _threads(count: int) -> Iterator[Executor | None]:
-    if count == 1:
-        yield None
-    else:
-        with ThreadPoolExecutor(count) as executor:
-            yield executor
-
-
-def _sum(
-    pavings: list[Paving], rtol: float, limits: Limits, executor: Executor | None
-) -> tuple[float, float]:
+def _sum(pavings: list[Paving], rtol: float, limits: Limits, workers: WorkerThreads) -> tuple[float, float]:
     """Bounds of the sum of the volumes."""
     while True:
         lower, upper = (sum(values) for values in zip(*(p.bounds for p in pavings), strict=True))
@@ -118,7 +106,7 @@ def _sum(
         if upper - lower <= rtol * lower or left < 2:
             return lower, upper
         goal = max(0.0, widest.gap - (upper - lower - rtol * lower))
-        if not widest.refine(goal, left, executor):
+        if not widest.refine(goal, left, workers):
             return lower, upper
 
 
@@ -137,7 +125,7 @@ class _Candidate:
 
 
 def _largest(
-    pavings: list[Paving], rtol: float, limits: Limits, executor: Executor | None
+    pavings: list[Paving], rtol: float, limits: Limits, workers: WorkerThreads
 ) -> tuple[float, float]:
     """Bounds of the volume of the largest connected part of any of the sets."""
     candidates = [_Candidate(paving, 0.0, paving.bounds[1], float("inf")) for paving in pavings]
@@ -150,7 +138,7 @@ def _largest(
         # parts are worth a look when the whole is known well enough, then whenever better by a third
         volume, _ = best.paving.bounds
         goal = min(NEARLY * rtol * volume, best.gap * 2.0 / 3.0)
-        if left < 2 or not best.paving.refine(goal, left, executor):
+        if left < 2 or not best.paving.refine(goal, left, workers):
             break
         volume, most = best.paving.bounds
         best.upper = min(best.upper, most)

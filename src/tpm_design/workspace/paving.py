@@ -7,13 +7,14 @@ that the result is the same for any number of threads.
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
+from contextlib import closing
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.worker_threads import THIS_THREAD, WorkerThreads
 from tpm_design.workspace.aspects import mode_octants
 from tpm_design.workspace.box_verdicts import constraint_counts, judge
 from tpm_design.workspace.equal_volume_charts import CHARTS_PER_OCTANT, largest_s
@@ -137,7 +138,7 @@ class Paving:
             np.empty((count, 2)),
             np.empty(count, np.int64),
         )
-        self.leaves = self._judged(whole, None)
+        self.leaves = self._judged(whole, THIS_THREAD)
 
     @property
     def boxes(self) -> int:
@@ -158,7 +159,7 @@ class Paving:
     def gap(self) -> float:
         return float(self.leaves.gaps.sum())
 
-    def refine(self, goal: float, most_boxes: int, executor: Executor | None = None) -> bool:
+    def refine(self, goal: float, most_boxes: int, workers: WorkerThreads = THIS_THREAD) -> bool:
         """One wave towards a total gap of ``goal`` (m³), of at most ``most_boxes`` new boxes; False where
         nothing can be halved."""
         gaps = self.leaves.gaps
@@ -166,23 +167,23 @@ class Paving:
         chosen = largest(gaps, max(LEAST_WAVE_SHARE * goal, excess / TAKEN), most_boxes // 2)
         if not chosen.any():
             return False
-        self.halve(chosen, executor)
+        self.halve(chosen, workers)
         return True
 
-    def halve(self, chosen: NDArray[np.bool_], executor: Executor | None = None) -> None:
+    def halve(self, chosen: NDArray[np.bool_], workers: WorkerThreads = THIS_THREAD) -> None:
         """Halve the chosen ones of the undecided boxes."""
         parents, self.leaves = self.leaves.where(chosen), self.leaves.where(~chosen)
         first = self.tree.size
         self.tree.child[parents.node] = first + 2 * np.arange(len(parents.node))
         self.tree.axis[parents.node] = parents.axis
-        self.leaves = self.leaves.and_also(self._judged(halves(parents), executor))
+        self.leaves = self.leaves.and_also(self._judged(halves(parents), workers))
 
-    def _judged(self, boxes: Leaves, executor: Executor | None) -> Leaves:
+    def _judged(self, boxes: Leaves, workers: WorkerThreads) -> Leaves:
         """Judge new boxes, put them into the tree and return those that are undecided."""
         count = len(boxes.boxes)
         shares, traits = np.empty((count, 2)), np.empty((count, 3), np.uint8)
 
-        def work(start: int, stop: int) -> None:
+        def judge_block(start: int) -> None:
             judge(
                 self._geometry,
                 self.target.mode.signs,
@@ -195,14 +196,12 @@ class Paving:
                 shares,
                 traits,
                 start,
-                stop,
+                min(count, start + BLOCK),
             )
 
-        if executor is None:
-            work(0, count)
-        else:
-            starts = range(0, count, BLOCK)
-            list(executor.map(work, starts, (min(count, start + BLOCK) for start in starts)))
+        with closing(workers.as_they_end(judge_block, range(0, count, BLOCK))) as judged:
+            for _ in judged:
+                pass
         boxes.inside = shares * boxes.volumes[:, None]
         boxes.axis = traits[:, 0].astype(np.int64)
         boxes.node = self.tree.grow(traits, boxes.inside)
