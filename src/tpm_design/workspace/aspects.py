@@ -178,11 +178,16 @@ def mode_field(mechanism: Mechanism, mode: Mode, *, order: int, sided: bool, flo
 def _from_origin(
     mechanism: Mechanism, mode: Mode, rays: tuple[RaySet, RaySet], *, sided: bool, floor: float
 ) -> tuple[RayField, RayField]:
-    half = np.asarray(mechanism.reach_half_axes())
-    radius = float(half.max())
-    x, y, z = (half / radius).tolist()
+    radius = max(mechanism.reach_half_axes())
     limits = radius / rays[0].lengths, radius / rays[1].lengths
-    return _fields(mechanism, mode, rays, limits, sided=sided, floor=floor, scale=(x, y, z))
+    return _fields(mechanism, mode, rays, limits, sided=sided, floor=floor, scale=mode_scale(mechanism))
+
+
+def mode_scale(mechanism: Mechanism) -> tuple[float, float, float]:
+    """``scale`` of the rays through a whole mode: the longest half axis of reach is 1."""
+    a, b, c = mechanism.reach_half_axes()
+    radius = max(a, b, c)
+    return a / radius, b / radius, c / radius
 
 
 def reach_parts(mechanism: Mechanism, mode: Mode, rays: RaySet) -> Segments:
