@@ -185,7 +185,17 @@ def evaluate(
     except (ParameterError, ArithmeticError) as error:
         reason = error.what if isinstance(error, ParameterError) else str(error)
         return Evaluation(
-            dict(design), {}, {}, {}, {}, {}, math.inf, "failed", reason, time.perf_counter() - began
+            design=dict(design),
+            metrics={},
+            errors={},
+            slacks={},
+            pieces={},
+            notes={},
+            violation=math.inf,
+            status="failed",
+            reason=reason,
+            seconds=time.perf_counter() - began,
+            slopes=None if neighbours is None else {},
         )
     return _judged(problem, design, measured, began, sampled=sampled, slopes=slopes)
 

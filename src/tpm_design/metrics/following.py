@@ -17,6 +17,9 @@ from tpm_design.workspace.extremes import Extreme, values_at_poses
 from tpm_design.workspace.fold_clearance import fold_clearance
 from tpm_design.workspace.indices import REACH, Index
 
+CORNER_STEP, CORNER = 1e-6, 1e-9
+"""Width of second differences, as a share of the machine's radius, and how large they are at a corner."""
+
 Values = Callable[[Context], NDArray[np.float64]]
 """Of a neighbouring design."""
 
@@ -39,12 +42,30 @@ def reach_of(context: Context) -> Values:
 
 
 def sides_of(context: Context) -> Values:
-    """The pieces (D, P) of ``Context.sides``."""
+    """The pieces (D, P) of ``Context.sides``. Out of reach determinants are extrapolated, with corners where
+    limbs are stretched: extremes there count as level."""
     sides = context.sides
     signs = np.array([side.index.sign for side in sides])
+    indices = [side.index for side in sides]
     poses = np.array([side.extreme.piece_poses for side in sides])
-    values = _at(context, [side.index for side in sides], poses)
-    return lambda other: signs[:, None] * values(other)
+    values = _at(context, indices, poses)
+    if context.reachable:
+        return lambda other: signs[:, None] * values(other)
+    here = np.array([side.pieces for side in sides])
+    cornered = _cornered(context, indices, poses)
+    return lambda other: np.where(cornered, here, signs[:, None] * values(other))
+
+
+def _cornered(context: Context, indices: Sequence[Index], poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """At which of its poses (K, P, 3) each index has a corner: there second differences are larger than the
+    square of their width."""
+    step = CORNER_STEP * context.mechanism.reach_radius()
+    ways = step * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
+    around = poses[:, :, None, :] + ways
+    shape = around.shape[:3]
+    values = _at(context, indices, around.reshape(len(indices), -1, 3))(context).reshape(shape)
+    bends = np.abs(values[:, :, 1:4] + values[:, :, 4:] - 2.0 * values[:, :, :1])
+    return np.asarray(bends.max(axis=2) > CORNER)
 
 
 def span_of(context: Context, span: Span) -> Callable[[Context], float]:

@@ -195,9 +195,7 @@ def _part(field: RayField, component: int | None) -> RayField:
     segments = field.segments
     return replace(
         field,
-        segments=Segments(
-            segments.ray[kept], segments.start[kept], segments.end[kept], segments.code[kept]
-        ),
+        segments=Segments(segments.ray[kept], segments.start[kept], segments.end[kept], segments.code[kept]),
         component=np.zeros(int(kept.sum()), np.int64),
         volumes=field.volumes[component : component + 1],
         sides=field.sides[component : component + 1],
@@ -272,9 +270,7 @@ def _moved(ends, rest, sums, rays, start, end, weights, component, count):  # ty
     return both[: start.size], both[start.size :], volumes
 
 
-def field_near(
-    boundary: MovingBoundary, mechanism: Mechanism, origin: Triple, scale: Triple
-) -> RayField:
+def field_near(boundary: MovingBoundary, mechanism: Mechanism, origin: Triple, scale: Triple) -> RayField:
     """The boundary's segments where a neighbouring machine has them, to first order, on rays of its ``origin``
     and ``scale`` (m): those of a mode (``mode_scale``), or of a placed region."""
     field = boundary.field

@@ -1,0 +1,189 @@
+"""Slopes of whole searches: of the cube's coordinates, of samples, in the log, and what they save."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tpm_design as tpm
+from tpm_design.optimizers.base import Slopes
+from tpm_design.optimizers.watch import Watch
+from tpm_design.problem import Evaluation, Problem, Sample
+from tpm_design.runs.folder import entry_from_json, entry_to_json
+from tpm_design.runs.optimize import SearchPlan, search, view_of
+from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch
+
+STUDY = """\
+version: 1
+name: slopes
+units: {length: mm, angle: deg}
+mechanism:
+  type: uru
+  parameters:
+    db: {ratio: f, min: 0.05, max: 0.4}
+    dp: {ratio: db, min: 0.2, max: 0.9, scale: log}
+    f: {min: 300, max: 700, scale: log}
+    r: {equals: f}
+    k: {values: [1, 2]}
+  mode: best
+region: {type: box, size: [60, 60, 60], center: free}
+objectives: [{metric: total_link_length, sense: minimize}]
+constraints:
+  - {metric: coverage, min: 1}
+  - {metric: conditioning_min, min: 0.2}
+  - {metric: velocity_max, max: 2}
+  - {metric: robot_size, max: 1400}
+  - {metric: actuator_range, max: 90}
+optimizer: {budget: 400, seed: 1}
+"""
+
+
+@pytest.fixture(scope="module")
+def problem(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+    path = tmp_path_factory.mktemp("slopes") / "study.yaml"
+    path.write_text(STUDY, encoding="utf-8")
+    return tpm.load_study(path).problem
+
+
+def view(problem: Problem) -> UnitSearch:
+    log = EvaluationLog(problem, workers=1)
+    whole = view_of(log, 10_000)
+    # pieces are known as soon as a design in the log has them
+    whole.evaluate(np.vstack([whole.start, np.random.default_rng(0).random((8, whole.dimension))]))
+    return whole.in_pieces()
+
+
+def slopes_at(seen: UnitSearch, point: np.ndarray) -> Slopes:
+    (found,) = seen.evaluate_sloped(point[None, :], np.ones(1, dtype=np.bool_)).slopes
+    assert found is not None
+    return found
+
+
+def agree_where_smooth(seen: UnitSearch, points: Sequence[np.ndarray], *, least: float) -> None:
+    """Slopes are the difference quotients wherever those to both sides agree, as ``least`` a share do."""
+    step, smooth, all_of_them = 1e-5, 0, 0
+    for point in points:
+        here, slopes = seen.evaluate(point), slopes_at(seen, point)
+        for number, count in enumerate(seen.levels):
+            ways = [point + sign * step * np.eye(seen.dimension)[number] for sign in (-1.0, 1.0)]
+            if count:
+                assert not slopes.gradient[number]
+                assert not slopes.jacobian[:, number].any()
+                continue
+            below, above = seen.evaluate(ways[0]), seen.evaluate(ways[1])
+            for row in range(-1, seen.constraint_count):
+                values = [
+                    float(found.objective[0] if row < 0 else found.constraints[0, row])
+                    for found in (below, here, above)
+                ]
+                before, after = (values[1] - values[0]) / step, (values[2] - values[1]) / step
+                slope = slopes.gradient[number] if row < 0 else slopes.jacobian[row, number]
+                if row >= 0 and not slopes.jacobian[row].any():
+                    # determinants where a limb is stretched, in a region that is out of reach
+                    assert here.constraints[0].min() < 0.0
+                    continue
+                all_of_them += 1
+                if abs(after - before) <= 1e-3 * max(1.0, abs(after)):
+                    smooth += 1
+                    assert slope == pytest.approx(0.5 * (before + after), abs=2e-3 * max(1.0, abs(after)))
+    assert smooth >= least * all_of_them
+
+
+def inner_points(dimension: int, count: int, seed: int) -> list[np.ndarray]:
+    return list(np.random.default_rng(seed).uniform(0.01, 0.99, (count, dimension)))
+
+
+def test_slopes_go_by_the_coordinates_of_the_cube(problem: Problem) -> None:
+    """Through logarithms, ratios of ratios, ties, and centres on the side of the mode's octant."""
+    seen = view(problem)
+    agree_where_smooth(seen, inner_points(seen.dimension, 25, 1), least=0.95)
+
+
+def test_slopes_of_samples(problem: Problem) -> None:
+    """Other machines than the nominal one, over the region and at a pose, judged with a margin."""
+    offsets = {"f": (1e-3, 0.0, -1e-3)}
+    samples = (
+        Sample("coverage", offsets, None, 1e-3),
+        Sample("conditioning_min", offsets, (0.03, -0.03, 0.03), 0.01),
+        Sample("velocity_max", {}, (0.0, 0.03, 0.03), 0.01),
+    )
+    sampled = view(replace(problem, samples=samples))
+    assert sampled.constraint_count > view(problem).constraint_count
+    agree_where_smooth(sampled, inner_points(sampled.dimension, 12, 2), least=0.9)
+
+
+def test_what_is_not_known_to_first_order_has_no_slopes(problem: Problem) -> None:
+    mean = tpm.load_study(Path(__file__).parents[1] / "studies" / "01-uru-cube.yaml").problem.record[0]
+    unsloped = replace(problem, constraints=(*problem.constraints, replace(mean, minimum=0.1)))
+    seen = view(unsloped)
+    point = inner_points(seen.dimension, 1, 3)[0]
+    assert seen.evaluate_sloped(point[None, :], np.ones(1, dtype=np.bool_)).slopes == (None,)
+
+
+def timeless(evaluation: Evaluation) -> dict[str, Any]:
+    return entry_to_json(Entry(0, evaluation)) | {"seconds": 0.0}
+
+
+def test_slopes_are_no_evaluations_and_change_none(problem: Problem) -> None:
+    seen = view(problem)
+    point = inner_points(seen.dimension, 1, 4)[0]
+    plain = seen.evaluate(point)
+    count = len(seen.log.entries)
+    before = seen.log.entries[-1].evaluation
+    again = seen.evaluate_sloped(point[None, :], np.ones(1, dtype=np.bool_))
+    after = seen.log.entries[-1].evaluation
+    assert len(seen.log.entries) == count
+    assert before.slopes is None
+    assert after.slopes is not None
+    assert timeless(replace(after, slopes=None)) == timeless(before)
+    assert again.constraints.tolist() == plain.constraints.tolist()
+
+
+def test_derivatives_of_libraries_come_without_evaluations(problem: Problem) -> None:
+    watch = Watch(view(problem))
+    log = watch.search.log  # type: ignore[attr-defined]
+    for number, point in enumerate(inner_points(watch.dimension, 3, 5)):
+        count = len(log.entries)
+        tangents = watch.tangents(point)
+        assert len(log.entries) == count + 1, number
+        assert tangents.slopes.jacobian.shape == (watch.constraint_count, watch.dimension)
+
+
+class Counting:
+    """Evaluates what it is asked, and counts what is not screened: of that a log may hold more than a cutoff
+    asks for."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+        self.workers = 1
+
+    def as_they_end(
+        self, task: partial[Any], problem: Problem, items: Sequence[Any]
+    ) -> Generator[tuple[int, Any]]:
+        for place, item in enumerate(items):
+            self.asked += task.keywords["cutoff"] is None
+            yield place, task(problem, item)
+
+    def close(self) -> None: ...
+
+
+def test_a_replay_finds_its_slopes_in_the_log(problem: Problem) -> None:
+    """Nothing is evaluated again, and a search that was cut short goes on as if it had not been."""
+    plan = SearchPlan("multistart", 400, 1, None)
+    whole = search(problem, plan, workers=1, record=lambda entry: None).entries
+    stored = [entry_from_json(entry_to_json(entry)) for entry in whole]
+    assert [timeless(e.evaluation) for e in stored] == [timeless(e.evaluation) for e in whole]
+    assert sum(entry.evaluation.slopes is not None for entry in stored) > 20
+    for kept in (len(stored), len(stored) // 2):
+        counting = Counting()
+        resumed = search(
+            problem, plan, workers=1, record=lambda entry: None, stored=stored[:kept], executor=counting
+        ).entries
+        assert [timeless(e.evaluation) for e in resumed] == [timeless(e.evaluation) for e in whole]
+        assert (counting.asked == 0) == (kept == len(stored))
