@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from tpm_design.optimizers.base import BudgetSpent, FloatArray, Optimizer, Outcomes, Stalled
+from counting_search import CountingSearch, run_to_its_end
+from tpm_design.optimizers.base import FloatArray, Optimizer, Outcomes
 from tpm_design.runs.front import non_dominated
 
 Values = tuple[list[float], list[float]]
-FEASIBLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -26,32 +26,10 @@ class FrontCase:
 
 
 @dataclass
-class FrontMemo:
-    """A search as the program makes one: repeated designs are free, a new one past the budget is refused."""
+class FrontMemo(CountingSearch[list[float]]):
+    """A search that tells all its objectives."""
 
     case: FrontCase
-    budget: int
-    log: list[FloatArray] = field(default_factory=list)
-    batches: list[int] = field(default_factory=list)
-    values: dict[bytes, Values] = field(default_factory=dict)
-    spent: bool = False
-    after_end: int = 0
-
-    @property
-    def dimension(self) -> int:
-        return len(self.case.start)
-
-    @property
-    def levels(self) -> tuple[int, ...]:
-        return self.case.levels or (0,) * self.dimension
-
-    @property
-    def start(self) -> FloatArray:
-        return np.array(self.case.start)
-
-    @property
-    def constraint_count(self) -> int:
-        return self.case.constraints
 
     @property
     def objective_count(self) -> int:
@@ -61,51 +39,22 @@ class FrontMemo:
         return self
 
     def evaluate(self, points: FloatArray) -> Outcomes:
-        self.after_end += self.spent
-        assert points.shape[1] == self.dimension
-        assert np.all((points >= 0.0) & (points <= 1.0))
-        paid = len(self.log)
-        results = [self._value(point) for point in points]
-        self.batches.append(len(self.log) - paid)
-        objectives = np.array([values for values, _ in results]).reshape(len(points), -1)
-        constraints = np.array([slack for _, slack in results]).reshape(len(points), self.case.constraints)
+        values, constraints = self.measured(points)
+        objectives = values.reshape(len(points), -1)
         pieces = tuple(column[:, None] for column in objectives.T)
         first = objectives[:, 0]
         return Outcomes(first, constraints, first, objectives=objectives, objective_pieces=pieces)
 
-    def _value(self, point: FloatArray) -> Values:
-        design = point.copy()
-        for i, count in enumerate(self.levels):
-            if count:
-                design[i] = (min(int(design[i] * count), count - 1) + 0.5) / count
-        key = design.tobytes()
-        if key not in self.values:
-            if len(self.log) >= self.budget:
-                self.spent = True
-                raise BudgetSpent
-            self.values[key] = self.case.function(design)
-            self.log.append(design)
-        return self.values[key]
-
     def front(self) -> tuple[FloatArray, FloatArray]:
         """Objectives (M, k) and designs (M, n) of the feasible front, by the first objective."""
-        found = [(self.values[x.tobytes()], x) for x in self.log]
-        feasible = [(values, x) for (values, slack), x in found if min(slack, default=0.0) >= -FEASIBLE]
-        assert feasible, "no feasible design was found"
-        table = np.array([values for values, _ in feasible])
+        values, designs = zip(*self.feasible(), strict=True)
+        table = np.array(values)
         rows = non_dominated(table)
-        return table[rows], np.array([x for _, x in feasible])[rows]
+        return table[rows], np.array(designs)[rows]
 
 
 def searched(method: Optimizer, case: FrontCase, budget: int, seed: int = 1) -> FrontMemo:
-    search = FrontMemo(case, budget)
-    try:
-        assert method.run(search, seed).endswith(".")
-    except BudgetSpent:
-        assert search.spent
-    except Stalled as end:
-        assert str(end).endswith(".")
-    return search
+    return run_to_its_end(method, FrontMemo(case, budget), seed)
 
 
 def between_two_points(x: FloatArray) -> Values:

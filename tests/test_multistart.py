@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tpm_design as tpm
+from small_studies import SHORTEST
 from test_optimizers import BRANIN, HYPERBOLA, REDUCER, Case, MemoSearch
 from tpm_design.baselines.reproduction import reproduce
 from tpm_design.optimizers import optimizer
@@ -29,28 +30,13 @@ from tpm_design.runs.optimize import SearchPlan, search, space_of
 from tpm_design.runs.search import Entry
 from tpm_design.study import load_study
 
-STUDY = """\
-version: 1
-name: small
-units: {length: mm, angle: deg}
-mechanism:
-  type: uru
-  parameters:
-    db: 100
-    dp: 60
-    f: {min: 100, max: 500, initial: 250}
-    r: {min: 100, max: 500, initial: 250}
-    k: {values: [1, 2]}
-  mode: {octant: "+++", elbows: "+++"}
-region: {type: box, size: [70, 70, 70], center: [150, 150, 150]}
-objectives:
-  - {metric: total_link_length, sense: minimize}
-constraints:
-  - {metric: coverage, min: 1}
-  - {metric: conditioning_min, min: 0.2}
+STUDY = (
+    SHORTEST
+    + """\
 optimizer: {method: multistart, budget: 300, seed: 1}
 accuracy: {region_samples: 5}
 """
+)
 
 
 @dataclass

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +15,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from counting_search import CountingSearch, run_to_its_end
 from tpm_design.errors import RefusedError, UsageError
 from tpm_design.optimizers import OPTIMIZERS, check_pair, optimizer
-from tpm_design.optimizers.base import BudgetSpent, FloatArray, Optimizer, Outcomes, Stalled
+from tpm_design.optimizers.base import BudgetSpent, FloatArray, Optimizer, Outcomes
 from tpm_design.optimizers.refusal import refusal
 from tpm_design.optimizers.watch import DIFFERENCE_STEP, Watch
 
 Function = Callable[[FloatArray], tuple[float, list[float]]]
-FEASIBLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -38,85 +38,23 @@ class Case:
 
 
 @dataclass
-class MemoSearch:
-    """A search as the program makes one: repeated designs are free, a new one past the budget is refused.
-
-    ``log``: the designs in the order they were paid for. ``after_end``: calls after the budget was spent.
-    """
+class MemoSearch(CountingSearch[float]):
+    """A search for the least feasible value."""
 
     case: Case
-    budget: int
-    log: list[FloatArray] = field(default_factory=list)
-    batches: list[int] = field(default_factory=list)
-    values: dict[bytes, tuple[float, list[float]]] = field(default_factory=dict)
-    spent: bool = False
-    after_end: int = 0
-
-    @property
-    def dimension(self) -> int:
-        return len(self.case.start)
-
-    @property
-    def levels(self) -> tuple[int, ...]:
-        return self.case.levels or (0,) * self.dimension
-
-    @property
-    def start(self) -> FloatArray:
-        return np.array(self.case.start)
-
-    @property
-    def constraint_count(self) -> int:
-        return self.case.constraints
 
     def evaluate(self, points: FloatArray) -> Outcomes:
-        self.after_end += self.spent
-        assert points.ndim == 2
-        assert points.shape[1] == self.dimension
-        assert np.all((points >= 0.0) & (points <= 1.0))
-        paid = len(self.log)
-        results = [self._value(point) for point in points]
-        self.batches.append(len(self.log) - paid)
-        objective = np.array([value for value, _ in results])
-        constraints = np.array([slack for _, slack in results]).reshape(len(points), self.case.constraints)
+        objective, constraints = self.measured(points)
         violation = np.maximum(0.0, -constraints).sum(axis=1)
         return Outcomes(objective, constraints, objective + self.case.penalty * violation)
 
-    def _value(self, point: FloatArray) -> tuple[float, list[float]]:
-        design = point.copy()
-        for i, count in enumerate(self.levels):
-            if count:
-                design[i] = (min(int(design[i] * count), count - 1) + 0.5) / count
-        key = design.tobytes()
-        if key not in self.values:
-            if len(self.log) >= self.budget:
-                self.spent = True
-                raise BudgetSpent
-            self.values[key] = self.case.function(design)
-            self.log.append(design)
-        return self.values[key]
-
     def best(self) -> tuple[float, FloatArray]:
-        """The least feasible value and its design."""
-        feasible = [
-            (self.values[x.tobytes()][0], i)
-            for i, x in enumerate(self.log)
-            if min(self.values[x.tobytes()][1], default=0.0) >= -FEASIBLE
-        ]
-        assert feasible, "no feasible design was found"
-        value, index = min(feasible)
-        return value, self.log[index]
+        """The least feasible value and its design, of several the first."""
+        return min(self.feasible(), key=lambda found: found[0])
 
 
 def searched(method: Optimizer, case: Case, budget: int, seed: int = 1) -> MemoSearch:
-    search = MemoSearch(case, budget)
-    try:
-        sentence = method.run(search, seed)
-        assert sentence.endswith(".")
-    except BudgetSpent:
-        assert search.spent
-    except Stalled as end:
-        assert str(end).endswith(".")
-    return search
+    return run_to_its_end(method, MemoSearch(case, budget), seed)
 
 
 def bowl(x: FloatArray) -> tuple[float, list[float]]:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from small_studies import CERTIFIED
 from tpm_design.certificates.document import FILE
 from tpm_design.certificates.verdict import Verdict, verdict
 from tpm_design.problem import Problem, Sample, design_context, evaluate, offset_mechanism
@@ -23,24 +24,10 @@ from tpm_design.runs.search import Entry, best_entry
 from tpm_design.study import Study, load_study
 from tpm_design.study.actions import Run, evaluations_frame
 
-TEXT = """\
-version: 1
-name: small
-units: {length: mm, angle: deg}
-mechanism:
-  type: uru
-  parameters: {db: 178, dp: 60, f: {min: 100, max: 400}, r: {min: 100, max: 400}, k: 1}
-  mode: {octant: "+++", elbows: "+++"}
-region: {type: box, size: [60, 60, 60], center: [150, 150, 150]}
-objectives: [{metric: total_link_length, sense: minimize}]
-constraints: [{metric: conditioning_min, label: even, norm: frobenius, min: 0.8}]
-optimizer: {method: scipy.differential_evolution, budget: 120, seed: 1, polish: nlopt.cobyla}
-certify: {tolerance: {f: 0.1, r: 0.1}, boxes: 20000}
-"""
 WITHIN = {"f": 1e-4, "r": 1e-4}
 
 
-def study_of(folder: Path, text: str = TEXT) -> Study:
+def study_of(folder: Path, text: str = CERTIFIED) -> Study:
     path = folder / "study.yaml"
     path.write_text(text, encoding="utf-8")
     return load_study(path)
@@ -178,7 +165,7 @@ def test_a_round_without_a_feasible_design_leaves_the_best_one_before_with_its_v
     tmp_path: Path,
 ) -> None:
     """Rough tolerances, and eight evaluations for a second round: it can judge old designs again, no more."""
-    text = TEXT.replace("{f: 0.1, r: 0.1}", "{f: 20, r: 20}")
+    text = CERTIFIED.replace("{f: 0.1, r: 0.1}", "{f: 20, r: 20}")
     run = study_of(tmp_path, text).optimize(budget=40, output=tmp_path)
     assert [one.outcome for one in run.result.rounds] == ["refuted", "infeasible"]
     assert run.verdict is not None
@@ -193,7 +180,7 @@ def test_a_round_without_a_feasible_design_leaves_the_best_one_before_with_its_v
 
 
 def test_too_few_boxes_leave_the_design_not_proved(tmp_path: Path) -> None:
-    run = study_of(tmp_path, TEXT.replace("boxes: 20000", "boxes: 20")).optimize(budget=100)
+    run = study_of(tmp_path, CERTIFIED.replace("boxes: 20000", "boxes: 20")).optimize(budget=100)
     assert run.verdict is not None
     assert run.verdict.outcome == "undecided"
     assert (
@@ -204,7 +191,9 @@ def test_too_few_boxes_leave_the_design_not_proved(tmp_path: Path) -> None:
 
 
 def test_nothing_is_certified_where_nothing_is_feasible(tmp_path: Path) -> None:
-    run = study_of(tmp_path, TEXT.replace("min: 0.8", "min: 0.99999")).optimize(budget=40, output=tmp_path)
+    run = study_of(tmp_path, CERTIFIED.replace("min: 0.8", "min: 0.99999")).optimize(
+        budget=40, output=tmp_path
+    )
     assert run.folder is not None
     assert run.verdict is None
     assert run.result.rounds[0].outcome == "infeasible"
@@ -215,7 +204,7 @@ def test_nothing_is_certified_where_nothing_is_feasible(tmp_path: Path) -> None:
 
 
 def test_a_requirement_without_a_proof_starts_no_round(tmp_path: Path) -> None:
-    text = TEXT.replace("]\noptimizer", ", {metric: conditioning_mean, min: 0.1}]\noptimizer")
+    text = CERTIFIED.replace("]\noptimizer", ", {metric: conditioning_mean, min: 0.1}]\noptimizer")
     text = text.replace("min: 0.8", "min: 0.2").replace("min: 100", "min: 150")
     run = study_of(tmp_path, text).optimize(budget=40)
     assert len(run.result.rounds) == 1
@@ -227,7 +216,7 @@ def test_a_requirement_without_a_proof_starts_no_round(tmp_path: Path) -> None:
 
 
 def test_without_a_local_method_the_studys_own_searches_near_the_best(tmp_path: Path) -> None:
-    text = TEXT.replace(", polish: nlopt.cobyla", "").replace("{f: 0.1, r: 0.1}", "{f: 2, r: 2}")
+    text = CERTIFIED.replace(", polish: nlopt.cobyla", "").replace("{f: 0.1, r: 0.1}", "{f: 2, r: 2}")
     run = study_of(tmp_path, text).optimize(budget=240)
     assert len(run.result.rounds) > 1
     designs = [entry.evaluation.design for entry in run.result.entries if entry.round == 2]
@@ -241,7 +230,7 @@ def test_without_a_local_method_the_studys_own_searches_near_the_best(tmp_path: 
 
 
 def test_a_study_that_asks_for_no_proof_is_searched_as_ever(study: Study, tmp_path: Path) -> None:
-    plain = study_of(tmp_path, TEXT.split("certify:", maxsplit=1)[0])
+    plain = study_of(tmp_path, CERTIFIED.split("certify:", maxsplit=1)[0])
     run = plain.optimize(output=tmp_path)
     alone = search(
         plain.problem,

@@ -10,31 +10,17 @@ from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
+from small_studies import SHORTEST
 from tpm_design.cli.app import app
 
-STUDY = """\
-version: 1
-name: small
-units: {length: mm, angle: deg}
-mechanism:
-  type: uru
-  parameters:
-    db: 100
-    dp: 60
-    f: {min: 100, max: 500, initial: 250}
-    r: {min: 100, max: 500, initial: 250}
-    k: {values: [1, 2]}
-  mode: {octant: "+++", elbows: "+++"}
-region: {type: box, size: [70, 70, 70], center: [150, 150, 150]}
-objectives:
-  - {metric: total_link_length, sense: minimize}
-constraints:
-  - {metric: coverage, min: 1}
-  - {metric: conditioning_min, min: 0.2}
+STUDY = (
+    SHORTEST
+    + """\
   - {metric: rotation_singularity_distance, min: 20}
 optimizer: {method: scipy.differential_evolution, budget: 60, seed: 1}
 record: [{metric: velocity_max}]
 """
+)
 
 
 def written(folder: Path, text: str = STUDY, name: str = "study.yaml") -> Path:

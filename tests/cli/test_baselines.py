@@ -11,10 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-import test_certified_runs
 from command_line import STUDY, Outcome, tpm_design, written
 
 import tpm_design as tpm
+from small_studies import CERTIFIED
 from tpm_design.problem import evaluate
 from tpm_design.runs.folder import read_run
 from tpm_design.runs.tables import csv_line, designs_table
@@ -319,7 +319,7 @@ def test_a_number_may_come_back_anywhere_within_its_numeric_error(run: Path) -> 
 
 
 def test_a_design_is_judged_by_the_samples_of_its_round(tmp_path: Path) -> None:
-    folder = searched(tmp_path, text=test_certified_runs.STUDY)
+    folder = searched(tmp_path, text=CERTIFIED)
     assert tpm_design("reproduce", folder).code == 0
     study, entries = tpm.load_study(folder / "study.yaml"), read_run(folder).entries
     missed = next(

@@ -20,10 +20,11 @@ import psutil
 import pytest
 from clusters import environment, evaluated_or_killed, scheduler, worker
 from command_line import STUDY, command, tpm_design, written
-from test_resume import CERTIFIED, POLISHED, contents, only_run
+from test_resume import POLISHED, contents, only_run
 from test_sweep import OWN_FILE
 
 import tpm_design as tpm
+from small_studies import CERTIFIED
 from tpm_design.errors import RunStoppedError
 from tpm_design.problem import Design, evaluate
 from tpm_design.runs import dask_workers

@@ -23,6 +23,7 @@ import pytest
 from command_line import STUDY, command, tpm_design, written
 
 import tpm_design as tpm
+from small_studies import CERTIFIED
 from tpm_design.errors import UsageError
 from tpm_design.runs.folder import entry_to_json, read_run
 from tpm_design.runs.lock import FILE as LOCK
@@ -41,20 +42,6 @@ for old, new in (
     assert old in POLISHED
     POLISHED = POLISHED.replace(old, new)
 
-CERTIFIED = """\
-version: 1
-name: proved
-units: {length: mm, angle: deg}
-mechanism:
-  type: uru
-  parameters: {db: 178, dp: 60, f: {min: 100, max: 400}, r: {min: 100, max: 400}, k: 1}
-  mode: {octant: "+++", elbows: "+++"}
-region: {type: box, size: [60, 60, 60], center: [150, 150, 150]}
-objectives: [{metric: total_link_length, sense: minimize}]
-constraints: [{metric: conditioning_min, label: even, norm: frobenius, min: 0.8}]
-optimizer: {method: scipy.differential_evolution, budget: 120, seed: 1, polish: nlopt.cobyla}
-certify: {tolerance: {f: 0.1, r: 0.1}, boxes: 20000}
-"""
 ARCHITECTURES = (("a", 100), ("b", 120))
 SECONDS = "seconds [s]"
 
