@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from tpm_design.metrics.base import Measurement, Metric, Option, of_positions
 from tpm_design.metrics.context import Context
-from tpm_design.metrics.following import reach_of, sides_of
+from tpm_design.metrics.following import reach_of, sides_of, span_measurement
+from tpm_design.metrics.moving_fields import MovingFields
 from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.region_geometry import POINTS
 from tpm_design.workspace.volume import selected_volume
@@ -23,23 +26,29 @@ HOME = Option("home", "point", "the aspect that holds this pose instead of the l
 
 
 def _reachable_volume(context: Context, options: Mapping[str, Any]) -> Measurement:
-    fine, coarse = (
-        selected_volume(field, largest_only=False) for field in context.mode_rays(0.0, sided=False)
-    )
-    return Measurement(fine, abs(fine - coarse))
-
-
-def _aspect_volume(context: Context, field: RayField, home: tuple[float, float, float] | None) -> float:
-    if home is None:
-        return selected_volume(field, largest_only=True)
-    component = context.aspect_of(field, home)
-    return 0.0 if component is None else float(field.volumes[component])
+    fields = context.mode_rays(0.0, sided=False)
+    fine, coarse = (selected_volume(field, largest_only=False) for field in fields)
+    moving = MovingFields(context.mechanism, context.mode, fields, (None, None), None)
+    return Measurement(fine, abs(fine - coarse), near=partial(_volume_near, moving))
 
 
 def _singularity_free_volume(context: Context, options: Mapping[str, Any]) -> Measurement:
-    margin = options["margin"]
+    margin, home = options["margin"], options["home"]
     fields = context.aspects if margin == 0.0 else context.mode_rays(margin, sided=True)
-    fine, coarse = (_aspect_volume(context, field, options["home"]) for field in fields)
+    one, other = (field.largest() if home is None else context.aspect_of(field, home) for field in fields)
+    fine, coarse = (
+        0.0 if chosen is None else float(field.volumes[chosen])
+        for field, chosen in zip(fields, (one, other), strict=True)
+    )
+    near = None
+    if one is not None and other is not None:
+        moving = MovingFields(context.mechanism, context.mode, fields, (one, other), margin)
+        near = partial(_volume_near, moving)
+    return Measurement(fine, abs(fine - coarse), near=near)
+
+
+def _volume_near(moving: MovingFields, neighbour: Context) -> Measurement:
+    fine, coarse = (float(np.sum(field.volumes)) for field in moving.near(neighbour))
     return Measurement(fine, abs(fine - coarse))
 
 
@@ -47,7 +56,14 @@ def _workspace_ratio(context: Context, options: Mapping[str, Any]) -> Measuremen
     volume = _singularity_free_volume(context, {"margin": 0.0, "home": None})
     if not context.reachable:
         return Measurement.undefined("the region is not reachable, so the robot's size is not known")
-    size = context.size
+    size = span_measurement(context, context.size)
+    of_volume, of_size = volume.near, size.near
+    if of_volume is None or of_size is None:
+        return _ratio(volume, size)
+    return replace(_ratio(volume, size), near=lambda other: _ratio(of_volume(other), of_size(other)))
+
+
+def _ratio(volume: Measurement, size: Measurement) -> Measurement:
     ratio = volume.value / size.value**3
     return Measurement(ratio, volume.error / size.value**3 + 3.0 * ratio * size.error / size.value)
 

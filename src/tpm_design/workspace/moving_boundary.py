@@ -26,6 +26,8 @@ Triple = tuple[float, float, float]
 # of its ray parameter: how far from an end the zero of the margin that ended it may be. Ends are found to
 # 1e-12, and a determinant's are at least 1e-9 of the segment away from those of reach
 NEAREST = 1e-10
+# of an end's distance from the origin: margins of reach that differ by less are both zero there
+TIED = 1e-9
 # how near the zero of a leg margin must be to carry a determinant's end along
 CARRIED = 0.03
 BY_REACH, BY_DETERMINANTS = 1, 2
@@ -33,8 +35,8 @@ BY_REACH, BY_DETERMINANTS = 1, 2
 
 class MovingEnds(NamedTuple):
     """E ends that margins move. ``place`` (E,): index among the starts and then the ends of S segments;
-    ``t`` (E,): ray parameter; ``directions`` (3, E) of the rays; ``reach`` and ``determinants`` (M, E): gains,
-    how far the end moves back along its ray per unit of each margin, 0 where that does not count.
+    ``t`` (E,): ray parameter; ``directions`` (3, E) of the rays; ``reach`` and ``determinants`` (M, E): gains
+    in ray parameter per unit of each margin by which the end moves back, 0 of those that do not move it.
 
     What reach moves has gains of reach alone. What determinants move has gains of determinants at a point
     that moves with the bound of reach nearest to it, if one is near: determinants go with the root of the
@@ -67,54 +69,91 @@ def _ends_here(value, slope, t, closing):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _reach_gains(geometry, mode, pose, t, closing, gains):  # type: ignore[no-untyped-def]
-    """Write 1/slope of each margin of reach that ends the segment here, 0 of the others, or, where none does,
-    1/slope of the leg margin whose zero is nearest if that is near; how many end it."""
-    count, row = 0, 0
-    nearest, least, gain = 0, CARRIED * t, 0.0
-    for margin in equations.leg_margins(geometry, mode, *pose):
+def _least_ending(margins, t, closing):  # type: ignore[no-untyped-def]
+    """Least |margin| (m) of those that may end the segment here."""
+    least = math.inf
+    for margin in margins:
+        if _ends_here(margin.value, margin.derivatives[0], t, closing):
+            least = min(least, abs(margin.value))
+    return least
+
+
+@inner
+def _reach_gains(margins, most, t, closing, gains):  # type: ignore[no-untyped-def]
+    """Write 1/slope of each margin of reach that ends the segment here and is at most ``most`` (m), 0 of the
+    others; how many do."""
+    count = 0
+    for row, margin in enumerate(margins):
         slope = margin.derivatives[0]
-        if _ends_here(margin.value, slope, t, closing):
+        if abs(margin.value) <= most and _ends_here(margin.value, slope, t, closing):
             gains[row] = 1.0 / slope
             count += 1
-        elif abs(margin.value) < least * abs(slope):
-            nearest, least, gain = row, abs(margin.value / slope), 1.0 / slope
-        row += 1
-    for margin in equations.mode_margins(geometry, mode, *pose):
-        slope = margin.derivatives[0]
-        if _ends_here(margin.value, slope, t, closing):
-            gains[row] = 1.0 / slope
-            count += 1
-        row += 1
-    if count == 0:
-        gains[nearest] = gain
     return count
 
 
 @inner
-def _determinant_gains(geometry, mode, floor, code, pose, t, closing, gains):  # type: ignore[no-untyped-def]
+def _carrying_gain(margins, t, gains):  # type: ignore[no-untyped-def]
+    """Write 1/slope of the margin whose zero is nearest, if that is near."""
+    nearest, least, gain = 0, CARRIED * t, 0.0
+    for row, margin in enumerate(margins):
+        slope = margin.derivatives[0]
+        if abs(margin.value) < least * abs(slope):
+            nearest, least, gain = row, abs(margin.value / slope), 1.0 / slope
+    gains[nearest] = gain
+
+
+@inner
+def _slopes(margins, slopes):  # type: ignore[no-untyped-def]
+    """Write the margins' slopes along the ray; whether all are finite."""
+    finite = True
+    for row, margin in enumerate(margins):
+        slopes[row] = margin.derivatives[0]
+        finite = finite and math.isfinite(slopes[row])
+    return finite
+
+
+@inner
+def _slopes_across(geometry, mode, origin, scale, direction, t, slopes):  # type: ignore[no-untyped-def]
+    """Difference quotients of the determinants along a ray, in place: where rays passed a hole of reach
+    without noticing, the elbow's root is clamped and has no slope, while determinants go on."""
+    h = 1e-6 * t
+    slopes[:] = 0.0
+    for side in (-1.0, 1.0):
+        x, y, z = _at(origin, scale, direction, t + side * h)
+        for row, value in enumerate(equations.singularity_margins(geometry, mode, x, y, z)):
+            slopes[row] += 0.5 * side * value / h
+
+
+@inner
+def _determinant_gains(margins, slopes, floor, code, t, closing, gains):  # type: ignore[no-untyped-def]
     """Write 1/slope of the determinants that fall to ``floor`` here on the sides of ``code``; how many."""
-    count, row = 0, 0
-    bits = code - 1
-    for margin in equations.singularity_margins(geometry, mode, *pose):
+    count, bits = 0, code - 1
+    for row, margin in enumerate(margins):
         sign = 1.0 if bits % 2 == 1 else -1.0
         bits //= 2
-        slope = margin.derivatives[0]
-        if _ends_here(sign * margin.value - floor, sign * slope, t, closing):
-            gains[row] = 1.0 / slope
+        if _ends_here(sign * margin.value - floor, sign * slopes[row], t, closing):
+            gains[row] = 1.0 / slopes[row]
             count += 1
-        row += 1
     return count
+
+
+@inner
+def _at(origin, scale, direction, t):  # type: ignore[no-untyped-def]
+    return (
+        origin[0] + t * (scale[0] * direction[0]),
+        origin[1] + t * (scale[1] * direction[1]),
+        origin[2] + t * (scale[2] * direction[2]),
+    )
 
 
 @inner
 def _ray_pose(origin, scale, direction, t):  # type: ignore[no-untyped-def]
     """A pose on a ray as Duals over the ray's parameter."""
-    u, v, w = scale[0] * direction[0], scale[1] * direction[1], scale[2] * direction[2]
+    x, y, z = _at(origin, scale, direction, t)
     return (
-        Dual(origin[0] + t * u, (u,)),
-        Dual(origin[1] + t * v, (v,)),
-        Dual(origin[2] + t * w, (w,)),
+        Dual(x, (scale[0] * direction[0],)),
+        Dual(y, (scale[1] * direction[1],)),
+        Dual(z, (scale[2] * direction[2],)),
     )
 
 
@@ -124,10 +163,11 @@ def _moving_ends(geometry, mode, sided, floor, origin, scale, directions, segmen
     determinants, and what moves each: 1 reach, 2 determinants, 0 nothing."""
     rays, start, end, codes = segments
     size = rays.size
-    pose = _ray_pose(origin, scale, directions[0], 1.0)
-    leg_count = len(equations.leg_margins(geometry, mode, *pose))
-    reach = np.zeros((2 * size, leg_count + len(equations.mode_margins(geometry, mode, *pose))))
-    determinants = np.zeros((2 * size, len(equations.singularity_margins(geometry, mode, *pose))))
+    x, y, z = origin
+    leg_count = len(equations.leg_margins(geometry, mode, x, y, z))
+    reach = np.zeros((2 * size, leg_count + len(equations.mode_margins(geometry, mode, x, y, z))))
+    determinants = np.zeros((2 * size, len(equations.singularity_margins(geometry, mode, x, y, z))))
+    slopes = np.empty(determinants.shape[1])
     reasons = np.zeros(2 * size, np.int64)
     for place in range(2 * size):
         closing = place >= size
@@ -135,16 +175,30 @@ def _moving_ends(geometry, mode, sided, floor, origin, scale, directions, segmen
         t = end[s] if closing else start[s]
         if t == 0.0:
             continue
-        pose = _ray_pose(origin, scale, directions[rays[s]], t)
+        direction = directions[rays[s]]
+        pose = _ray_pose(origin, scale, direction, t)
+        length = t * math.sqrt(
+            (scale[0] * direction[0]) ** 2 + (scale[1] * direction[1]) ** 2 + (scale[2] * direction[2]) ** 2
+        )
         # first: on the shell of reach determinants have no finite slope
+        legs = equations.leg_margins(geometry, mode, *pose)
+        limits = equations.mode_margins(geometry, mode, *pose)
+        # a stroke has infinite slope where its strut is square to the rail: near zero by slope, not by value
+        most = min(_least_ending(legs, t, closing), _least_ending(limits, t, closing)) + TIED * length
         gains = reach[place]
-        count = _reach_gains(geometry, mode, pose, t, closing, gains)
+        count = _reach_gains(legs, most, t, closing, gains)
+        count += _reach_gains(limits, most, t, closing, gains[leg_count:])
         if count > 0:
             reasons[place] = BY_REACH
         elif sided:
+            margins = equations.singularity_margins(geometry, mode, *pose)
+            if not _slopes(margins, slopes):
+                _slopes_across(geometry, mode, origin, scale, direction, t, slopes)
             gains = determinants[place]
-            count = _determinant_gains(geometry, mode, floor, codes[s], pose, t, closing, gains)
-            reasons[place] = BY_DETERMINANTS if count > 0 else 0
+            count = _determinant_gains(margins, slopes, floor, codes[s], t, closing, gains)
+            if count > 0:
+                reasons[place] = BY_DETERMINANTS
+                _carrying_gain(legs, t, reach[place])
         # several margins at once, as on a plane of symmetry: each moves half of what is around the ray
         for k in range(gains.size):
             gains[k] /= max(1, count)
@@ -179,11 +233,11 @@ def moving_boundary(
         for place in (np.flatnonzero(reasons == reason) for reason in (BY_REACH, BY_DETERMINANTS))
     )
     ends = by_reach, by_determinants
-    own = (mechanism.geometry, mode.signs, field.origin, field.scale, ends)
     still = tuple(np.zeros(group.place.size) for group in (by_reach, by_determinants, by_determinants))
-    first = _sums(*own, still)
-    # the determinants' own sums are those at ends that are not carried along
-    rest = _sums(*own, (*first[:2], still[2]))
+    own = mechanism.geometry, mode.signs, field.origin, field.scale, ends
+    (ended, carrying, _), *_ = _near(*own, still, _segments_of(parts))
+    # where nothing is carried anywhere
+    rest, *_ = _near(*own, (ended, carrying, still[2]), _segments_of(parts))
     return MovingBoundary(parts, mode.signs, ends, rest)
 
 
@@ -204,7 +258,7 @@ def _part(field: RayField, component: int | None) -> RayField:
 
 
 @fast_kernel
-def _reach_levels(geometry, mode, x, y, z, gains, out):  # type: ignore[no-untyped-def]
+def _reach_sums(geometry, mode, x, y, z, gains, out):  # type: ignore[no-untyped-def]
     """Σ gain · margin of reach (E,), written in place."""
     for n in range(x.size):
         total, row = 0.0, 0
@@ -218,13 +272,12 @@ def _reach_levels(geometry, mode, x, y, z, gains, out):  # type: ignore[no-untyp
 
 
 @fast_kernel
-def _determinant_levels(geometry, mode, x, y, z, gains, out):  # type: ignore[no-untyped-def]
-    """As ``_reach_levels``, of the determinants."""
+def _determinant_sums(geometry, mode, x, y, z, gains, out):  # type: ignore[no-untyped-def]
+    """As ``_reach_sums``, of the determinants."""
     for n in range(x.size):
-        total, row = 0.0, 0
-        for margin in equations.singularity_margins(geometry, mode, x[n], y[n], z[n]):
+        total = 0.0
+        for row, margin in enumerate(equations.singularity_margins(geometry, mode, x[n], y[n], z[n])):
             total += gains[row, n] * margin if gains[row, n] != 0.0 else 0.0
-            row += 1
         out[n] = total
 
 
@@ -239,52 +292,61 @@ def _poses(origin, scale, t, directions):  # type: ignore[no-untyped-def]
 
 
 @short_kernel
-def _sums(geometry, mode, origin, scale, ends, rest):  # type: ignore[no-untyped-def]
-    """Σ gain · margin: of reach at the ends it moves, of reach at those that determinants move, and of the
-    determinants there, carried along by what the second sums differ from ``rest``."""
+def _near(geometry, mode, origin, scale, ends, rest, parts):  # type: ignore[no-untyped-def]
+    """Of a machine near the one whose segments (S) they are:
+
+    Σ gain · margin of reach at the ends it moves, of reach at those that determinants move, and of the
+    determinants there, carried along by what the second sums differ from ``rest``; starts and ends (S,),
+    moved by what all of them differ from it; and per connected set Σ weight ∫ t² dt.
+    """
     by_reach, by_determinants = ends
+    rays, start, end, weights, component, count = parts
     ended = np.empty(by_reach.t.size)
     x, y, z = _poses(origin, scale, by_reach.t, by_reach.directions)
-    _reach_levels(geometry, mode, x, y, z, by_reach.reach, ended)
+    _reach_sums(geometry, mode, x, y, z, by_reach.reach, ended)
     carrying, carried = np.empty(by_determinants.t.size), np.empty(by_determinants.t.size)
     x, y, z = _poses(origin, scale, by_determinants.t, by_determinants.directions)
-    _reach_levels(geometry, mode, x, y, z, by_determinants.reach, carrying)
+    _reach_sums(geometry, mode, x, y, z, by_determinants.reach, carrying)
     t = by_determinants.t + (rest[1] - carrying)
     x, y, z = _poses(origin, scale, t, by_determinants.directions)
-    _determinant_levels(geometry, mode, x, y, z, by_determinants.determinants, carried)
-    return ended, carrying, carried
-
-
-@short_kernel
-def _moved(ends, rest, sums, rays, start, end, weights, component, count):  # type: ignore[no-untyped-def]
-    """Starts and ends (S,) of the neighbour's segments, and Σ weight ∫ t² dt of its ``count`` sets."""
-    both = np.concatenate((start, end))
-    by_reach, by_determinants = ends
-    for n in range(by_reach.t.size):
-        both[by_reach.place[n]] += rest[0][n] - sums[0][n]
-    for n in range(by_determinants.t.size):
-        both[by_determinants.place[n]] += (rest[1][n] - sums[1][n]) + (rest[2][n] - sums[2][n])
+    _determinant_sums(geometry, mode, x, y, z, by_determinants.determinants, carried)
+    starts_ends = np.concatenate((start, end))
+    for n in range(ended.size):
+        starts_ends[by_reach.place[n]] += rest[0][n] - ended[n]
+    for n in range(carried.size):
+        starts_ends[by_determinants.place[n]] += (rest[1][n] - carrying[n]) + (rest[2][n] - carried[n])
+    start, end = starts_ends[: rays.size], starts_ends[rays.size :]
     volumes = np.zeros(count)
     for s in range(rays.size):
-        volumes[component[s]] += weights[rays[s]] * (both[start.size + s] ** 3 - both[s] ** 3) / 3.0
-    return both[: start.size], both[start.size :], volumes
+        volumes[component[s]] += weights[rays[s]] * (end[s] ** 3 - start[s] ** 3) / 3.0
+    return (ended, carrying, carried), start, end, volumes
 
 
-def field_near(boundary: MovingBoundary, mechanism: Mechanism, origin: Triple, scale: Triple) -> RayField:
-    """The boundary's segments where a neighbouring machine has them, to first order, on rays of its ``origin``
-    and ``scale`` (m): those of a mode (``mode_scale``), or of a placed region."""
-    field = boundary.field
-    sums = _sums(mechanism.geometry, boundary.signs, origin, scale, boundary.ends, boundary.rest)
-    start, end, volumes = _moved(
-        boundary.ends,
-        boundary.rest,
-        sums,
-        field.segments.ray,
-        field.segments.start,
-        field.segments.end,
+def _segments_of(field: RayField) -> tuple[Any, ...]:
+    """As ``_near`` takes them."""
+    segments = field.segments
+    return (
+        segments.ray,
+        segments.start,
+        segments.end,
         field.rays.weights,
         field.component,
         field.volumes.size,
+    )
+
+
+def field_near(boundary: MovingBoundary, mechanism: Mechanism, origin: Triple, scale: Triple) -> RayField:
+    """The boundary's segments where a neighbouring machine has them, to first order, on rays of its
+    ``origin`` and ``scale`` (m): those of a mode (``mode_scale``), or of a placed region."""
+    field = boundary.field
+    _, start, end, volumes = _near(
+        mechanism.geometry,
+        boundary.signs,
+        origin,
+        scale,
+        boundary.ends,
+        boundary.rest,
+        _segments_of(field),
     )
     cell = abs(scale[0] * scale[1] * scale[2])
     return replace(

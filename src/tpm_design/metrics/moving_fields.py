@@ -1,0 +1,48 @@
+"""Ray fields of a design, moved to its neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.metrics.context import Context
+from tpm_design.workspace.aspects import RayField
+from tpm_design.workspace.moving_boundary import (
+    MovingBoundary,
+    field_near,
+    mode_field_near,
+    moving_boundary,
+)
+
+
+@dataclass(frozen=True)
+class MovingFields:
+    """A fine and a coarse ray field of a design, of each one connected set (its index in ``components``) or
+    all (None). ``floor``: as they were traced with, None where reach alone was looked at. ``of_region``: rays
+    of the placed region, not of the whole mode. What moves their ends is found when a neighbour first asks.
+    """
+
+    mechanism: Mechanism
+    mode: Mode
+    fields: tuple[RayField, RayField]
+    components: tuple[int | None, int | None]
+    floor: float | None
+    of_region: bool = False
+
+    @cached_property
+    def _boundaries(self) -> tuple[MovingBoundary, ...]:
+        return tuple(
+            moving_boundary(self.mechanism, self.mode, field, component, self.floor)
+            for field, component in zip(self.fields, self.components, strict=True)
+        )
+
+    def near(self, neighbour: Context) -> tuple[RayField, RayField]:
+        """The fields of a neighbouring design, to first order."""
+        machine = neighbour.mechanism
+        if self.of_region:
+            region = neighbour.placed
+            fine, coarse = (field_near(b, machine, region.centre, region.half) for b in self._boundaries)
+        else:
+            fine, coarse = (mode_field_near(b, machine) for b in self._boundaries)
+        return fine, coarse
