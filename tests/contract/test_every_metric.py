@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -150,21 +151,41 @@ def near_good(kind: MechanismKind, seed: int) -> Design:
     return design
 
 
-def bounded(goal: Goal, value: float) -> Goal:
-    """A constraint on it that is met by 1; coverage is asked for in full."""
-    minimum = 1.0 if goal.metric.name == "coverage" else value - 1.0
-    return Goal(goal.metric, goal.label, goal.options, minimum=minimum)
+def asked_for(kind: MechanismKind) -> Problem:
+    """Every metric as an objective, so that its slopes are those of its value; coverage, whose value is
+    level, as a constraint."""
+    goals = [goal_of(metric, kind) for metric in meaningful(kind)]
+    objectives = tuple(
+        Goal(goal.metric, goal.label, goal.options, sense=goal.metric.better)
+        for goal in goals
+        if goal.label != "coverage"
+    )
+    constraints = tuple(
+        Goal(goal.metric, goal.label, goal.options, minimum=1.0) for goal in goals if goal.label == "coverage"
+    )
+    problem = problem_of(kind, constraints=constraints)
+    return replace(problem, objectives=objectives)
+
+
+def value_of(evaluation: Evaluation, label: str) -> float:
+    return evaluation.slacks[label] if label in evaluation.slacks else evaluation.metrics[label]
+
+
+def slope_of_value(evaluation: Evaluation, label: str) -> tuple[float, ...]:
+    """Of the piece that is the value."""
+    assert evaluation.slopes is not None
+    rows, pieces = evaluation.slopes[label], evaluation.pieces.get(label) or (0.0,)
+    greatest = label in METRICS and METRICS[label].better == "minimize"
+    return rows[int(np.argmax(pieces) if greatest else np.argmin(pieces))]
 
 
 def test_slopes_are_derivatives_of_the_metric(kind: MechanismKind) -> None:
     """Where differences to both sides agree, so that there is no kink, the slope agrees with them."""
-    goals = [goal_of(metric, kind) for metric in meaningful(kind)]
-    checked = dict.fromkeys((goal.label for goal in goals), 0)
+    problem = asked_for(kind)
+    names = [*kind.example, *kind.centre_names]
+    checked = {goal.label: 0 for goal in (*problem.objectives, *problem.constraints)}
     for seed in range(2):
         design = near_good(kind, seed)
-        values = evaluate(problem_of(kind, *goals), design).metrics
-        problem = problem_of(kind, constraints=tuple(bounded(goal, values[goal.label]) for goal in goals))
-        names = [*kind.example, *kind.centre_names]
         around = [Neighbour(changed(design, name, SLOPE_STEP), SLOPE_STEP) for name in names]
         here = evaluate(problem, design, None, around)
         assert here.slopes is not None
@@ -172,16 +193,14 @@ def test_slopes_are_derivatives_of_the_metric(kind: MechanismKind) -> None:
             below, above = (
                 evaluate(problem, changed(design, name, step)) for step in (-DIFFERENCE, DIFFERENCE)
             )
-            for label, rows in here.slopes.items():
-                before, after = (
-                    (other.slacks[label] + other.errors[label] - here.slacks[label] - here.errors[label])
-                    / step
-                    for other, step in ((below, -DIFFERENCE), (above, DIFFERENCE))
-                )
+            for label in here.slopes:
+                value = value_of(here, label)
+                before = (value - value_of(below, label)) / DIFFERENCE
+                after = (value_of(above, label) - value) / DIFFERENCE
                 size = max(1.0, abs(before), abs(after))
                 if abs(after - before) > 0.01 * size:
                     continue
                 checked[label] += 1
-                slope = rows[int(np.argmin(here.pieces[label]))][number]
+                slope = slope_of_value(here, label)[number]
                 assert slope == pytest.approx(0.5 * (before + after), abs=0.01 * size), (label, name)
     assert {label for label, count in checked.items() if count == 0} <= WITHOUT_SLOPES
