@@ -46,7 +46,8 @@ class Measurement:
     and ``full_slack`` replaces the slack of a constraint that asks for the full score 1 (coverage).
     ``pieces``: values whose least (of a metric to be large) or greatest is ``value``, or the pieces of
     ``full_slack``: smoother in the design than their minimum. ``notes`` are extra columns, such as which
-    locus was nearest.
+    locus was nearest. ``near``: the measurement of a neighbouring design's context, exact to first order;
+    None where there is no such slope.
     """
 
     value: float
@@ -55,6 +56,7 @@ class Measurement:
     full_slack: float | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
     pieces: tuple[float, ...] = ()
+    near: Callable[[Context], Measurement] | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def undefined(cls, reason: str) -> Measurement:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from tpm_design.metrics.base import Measurement, Metric, of_positions
 from tpm_design.metrics.context import Context
 from tpm_design.workspace.indices import CLEARANCE, LEGS, SERIAL, Index
+from tpm_design.workspace.locus_motion import LocusMotion, locus_motion
 
 SEARCH = "search along the region's normals, then sliding along the locus, ARCHITECTURE.md"
 
@@ -18,12 +20,19 @@ def _locus_distance(name: str) -> Callable[[Context, Mapping[str, Any]], Measure
             return Measurement(context.reach.value, context.reach.error, notes={"locus": "out of reach"})
         if name not in context.mechanism.kind.determinants:
             return Measurement(context.size.value, context.size.error, notes={"locus": "none"})
-        found = context.locus_distance(context.mechanism.kind.determinants.index(name))
+        part = context.mechanism.kind.determinants.index(name)
+        found = context.locus_distance(part)
         if found.pose is None:
             return Measurement(context.size.value, context.size.error, notes={"locus": "none"})
-        return Measurement(found.value, found.error, notes={"locus": name})
+        motion = locus_motion(context.mechanism, context.mode, context.placed, part, found)
+        here = Measurement(found.value, found.error, notes={"locus": name})
+        return here if motion is None else replace(here, near=_follows(here, motion))
 
     return compute
+
+
+def _follows(here: Measurement, motion: LocusMotion) -> Callable[[Context], Measurement]:
+    return lambda neighbour: replace(here, value=motion.distance(neighbour.mechanism, neighbour.placed))
 
 
 def _boundary_distance(context: Context, options: Mapping[str, Any]) -> Measurement:
