@@ -19,6 +19,7 @@ from tpm_design.metrics.following import (
     span_measurement,
 )
 from tpm_design.workspace.indices import CLEARANCE, LEGS, SERIAL, Index
+from tpm_design.workspace.locus_motion import LocusMotion, locus_motion
 
 CROSSED = 1e-6
 """Distance between the middles of links, as a share of the machine's radius, up to which they cross."""
@@ -32,12 +33,19 @@ def _locus_distance(name: str) -> Callable[[Context, Mapping[str, Any]], Measure
             return replace(reach_shortfall(context), notes={"locus": "out of reach"})
         if name not in context.mechanism.kind.determinants:
             return replace(span_measurement(context, context.size), notes={"locus": "none"})
-        found = context.locus_distance(context.mechanism.kind.determinants.index(name))
+        part = context.mechanism.kind.determinants.index(name)
+        found = context.locus_distance(part)
         if found.pose is None:
             return replace(span_measurement(context, context.size), notes={"locus": "none"})
-        return Measurement(found.value, found.error, notes={"locus": name})
+        motion = locus_motion(context.mechanism, context.mode, context.placed, part, found)
+        here = Measurement(found.value, found.error, notes={"locus": name})
+        return here if motion is None else replace(here, near=_follows(here, motion))
 
     return compute
+
+
+def _follows(here: Measurement, motion: LocusMotion) -> Callable[[Context], Measurement]:
+    return lambda neighbour: replace(here, value=motion.distance(neighbour.mechanism, neighbour.placed))
 
 
 def _boundary_distance(context: Context, options: Mapping[str, Any]) -> Measurement:
