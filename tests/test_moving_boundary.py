@@ -252,3 +252,35 @@ def test_metrics_near(metric: str, options: dict[str, Any]) -> None:
     above, below = (METRICS[metric].compute(context(h), options).value for h in (1e-5, -1e-5))
     near = [measured.near(context(h)).value for h in (STEP, -STEP)]
     assert (near[0] - near[1]) / (2.0 * STEP) == pytest.approx((above - below) / 2e-5, rel=1e-5)
+
+
+MEANS = [
+    ("robot_size", "aspect", "2"),
+    *(
+        (f"conditioning_{mean}", over, norm)
+        for mean in ("mean", "share")
+        for over in ("aspect", "region")
+        for norm in ("2", "frobenius")
+    ),
+]
+
+
+@pytest.mark.parametrize(("metric", "over", "norm"), MEANS)
+def test_means_near(metric: str, over: str, norm: str) -> None:
+    """Means over an aspect and over a region that is partly out of reach, against the metric itself."""
+    parameters = {"db": 0.178, "dp": 0.06, "f": 0.198, "r": 0.19, "k": 2.0}
+    options = {"norm": norm, "drive": "motor", "over": over, "threshold": 0.25}
+    shape = Box((0.3, 0.25, 0.28))
+
+    def context(length: str, share: float) -> Context:
+        built, mode = machine("uru", with_change(parameters, length, 0, share))
+        return Context(built, mode, place(shape, (0.2 + share, 0.18, 0.22)), 1e-3, 9)
+
+    measured = METRICS[metric].compute(context("f", 0.0), options)
+    assert measured.near is not None
+    own = measured.near(context("f", 0.0))
+    assert (own.value, own.error) == pytest.approx((measured.value, measured.error), rel=1e-12, abs=1e-14)
+    for length in ("db", "f", "r", "k"):
+        above, below = (METRICS[metric].compute(context(length, h), options).value for h in (1e-5, -1e-5))
+        near = [measured.near(context(length, h)).value for h in (STEP, -STEP)]
+        assert (near[0] - near[1]) / (2.0 * STEP) == pytest.approx((above - below) / 2e-5, rel=1e-4, abs=1e-6)

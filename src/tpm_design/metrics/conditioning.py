@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -11,8 +13,11 @@ from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.metrics.base import Measurement, Metric, Option
 from tpm_design.metrics.context import Context
 from tpm_design.metrics.following import extreme_measurement, out_of_reach, singular
+from tpm_design.metrics.moving_fields import MovingFields
+from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.averages import GAUSS_NODES, Averages, conditioning_averages
 from tpm_design.workspace.indices import CONDITION_2, CONDITION_FROBENIUS, Index, index_values
+from tpm_design.workspace.moving_level import MovingLevel, moving_level, volume_above_near
 from tpm_design.workspace.region_geometry import POINTS
 
 SOURCE = "C. Gosselin, J. Angeles, A global performance index for the kinematic optimization, 1991"
@@ -20,6 +25,10 @@ NORM = Option("norm", "choice", "norm of the condition number", default="2", cho
 DRIVE = Option("drive", "choice", "actuators: motors or joints", default="motor", choices=("motor", "joint"))
 OVER = Option("over", "choice", "domain", default="region", choices=("region", "aspect"))
 THRESHOLD = Option("threshold", "number", "1/κ asked for", minimum=0.0, maximum=1.0, required=True)
+
+
+# nothing is below it: no crossings are looked for
+NO_THRESHOLD = 0.0
 
 
 def _incomparable(kind: MechanismKind, limits: Mapping[str, Any]) -> str | None:
@@ -42,13 +51,17 @@ def _index(context: Context, options: Mapping[str, Any]) -> Index:
     return Index(quantity, motor=context.mechanism.motor_weight(options["drive"]))
 
 
-def _averages(context: Context, options: Mapping[str, Any], threshold: float) -> tuple[Averages, Averages]:
-    over_aspect = options["over"] == "aspect"
+def _averages(
+    context: Context,
+    options: Mapping[str, Any],
+    fields: tuple[RayField, RayField],
+    threshold: float = NO_THRESHOLD,
+) -> tuple[Averages, Averages]:
     return conditioning_averages(
         context.mechanism.geometry,
         context.mode.signs,
-        context.aspects if over_aspect else context.region_aspects,
-        largest=over_aspect,
+        fields,
+        largest=options["over"] == "aspect",
         frobenius=options["norm"] == "frobenius",
         motor=context.mechanism.motor_weight(options["drive"]),
         threshold=threshold,
@@ -58,7 +71,7 @@ def _averages(context: Context, options: Mapping[str, Any], threshold: float) ->
 
 def _minimum(context: Context, options: Mapping[str, Any]) -> Measurement:
     if options["over"] == "aspect":
-        fine, coarse = _averages(context, options, 0.5)
+        fine, coarse = _averages(context, options, context.aspects)
         return Measurement(fine.least, abs(fine.least - coarse.least))
     if not context.reachable:
         # unreachable poses count as singular; the reach shortfall guides a search back
@@ -79,31 +92,97 @@ def _at_points(context: Context, options: Mapping[str, Any]) -> np.ndarray:
 
 def _mean(context: Context, options: Mapping[str, Any]) -> Measurement:
     if options["over"] == "region" and context.placed.form == POINTS:
-        return Measurement(float(_at_points(context, options).mean()))
+        return replace(_mean_at_points(options, context), near=partial(_mean_at_points, options))
+    moving = _moving(context, options)
+    near = None if moving is None else partial(_mean_near, moving, options)
+    return replace(_mean_of(context, options, _fields(context, options)), near=near)
+
+
+def _mean_at_points(options: Mapping[str, Any], context: Context) -> Measurement:
+    return Measurement(float(_at_points(context, options).mean()))
+
+
+def _mean_of(context: Context, options: Mapping[str, Any], fields: tuple[RayField, RayField]) -> Measurement:
+    found = _averages(context, options, fields)
     fine, coarse = (
-        _share_of(context, options, averages, averages.conditioning, coarse)
-        for coarse, averages in enumerate(_averages(context, options, 0.5))
+        _share_of(options, each.conditioning, each.volume, field)
+        for each, field in zip(found, fields, strict=True)
     )
     return Measurement(fine, abs(fine - coarse))
+
+
+def _mean_near(moving: MovingFields, options: Mapping[str, Any], neighbour: Context) -> Measurement:
+    return _mean_of(neighbour, options, moving.near(neighbour))
 
 
 def _share(context: Context, options: Mapping[str, Any]) -> Measurement:
     threshold = options["threshold"]
     if options["over"] == "region" and context.placed.form == POINTS:
         return Measurement(float((_at_points(context, options) >= threshold).mean()))
+    fields = _fields(context, options)
+    found = _averages(context, options, fields, threshold)
     fine, coarse = (
-        _share_of(context, options, averages, averages.above, coarse)
-        for coarse, averages in enumerate(_averages(context, options, threshold))
+        _share_of(options, each.above, each.volume, field) for each, field in zip(found, fields, strict=True)
     )
-    return Measurement(fine, abs(fine - coarse))
+    moving = _moving(context, options)
+    near = None if moving is None else MovingShare(moving, options).near
+    return Measurement(fine, abs(fine - coarse), near=near)
 
 
-def _share_of(
-    context: Context, options: Mapping[str, Any], averages: Averages, integral: float, coarse: int
-) -> float:
+@dataclass(frozen=True)
+class MovingShare:
+    """The share of a design's ``moving`` fields above a threshold, for its neighbours. Where 1/κ passes the
+    threshold is found when one first asks."""
+
+    moving: MovingFields
+    options: Mapping[str, Any]
+
+    @cached_property
+    def _levels(self) -> tuple[MovingLevel, ...]:
+        return tuple(
+            moving_level(
+                self.moving.mechanism,
+                self.moving.mode,
+                boundary.field,
+                frobenius=self.options["norm"] == "frobenius",
+                motor=self.moving.mechanism.motor_weight(self.options["drive"]),
+                threshold=self.options["threshold"],
+                nodes=nodes,
+            )
+            for boundary, nodes in zip(self.moving.boundaries, GAUSS_NODES[self.options["over"]], strict=True)
+        )
+
+    def near(self, neighbour: Context) -> Measurement:
+        fields = self.moving.near(neighbour)
+        fine, coarse = (
+            _share_of(
+                self.options,
+                volume_above_near(level, neighbour.mechanism, field),
+                float(np.sum(field.volumes)),
+                field,
+            )
+            for level, field in zip(self._levels, fields, strict=True)
+        )
+        return Measurement(fine, abs(fine - coarse))
+
+
+def _fields(context: Context, options: Mapping[str, Any]) -> tuple[RayField, RayField]:
+    return context.aspects if options["over"] == "aspect" else context.region_aspects
+
+
+def _moving(context: Context, options: Mapping[str, Any]) -> MovingFields | None:
+    """The fields that integrals are taken over, ready to be moved; None where one of them is empty."""
+    fields = _fields(context, options)
+    of_region = options["over"] == "region"
+    fine, coarse = (None if of_region else field.largest() for field in fields)
+    if not all(field.volumes.size for field in fields):
+        return None
+    return MovingFields(context.mechanism, context.mode, fields, (fine, coarse), 0.0, of_region)
+
+
+def _share_of(options: Mapping[str, Any], integral: float, volume: float, field: RayField) -> float:
     """Integral over the domain's whole volume: poses of the region out of reach count as 0."""
-    over_region = options["over"] == "region"
-    whole = context.region_aspects[coarse].whole if over_region else averages.volume
+    whole = field.whole if options["over"] == "region" else volume
     # a domain that is whole may differ from its parts by rounding
     return min(1.0, integral / whole) if whole > 0.0 else 0.0
 

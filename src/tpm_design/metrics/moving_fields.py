@@ -31,7 +31,8 @@ class MovingFields:
     of_region: bool = False
 
     @cached_property
-    def _boundaries(self) -> tuple[MovingBoundary, ...]:
+    def boundaries(self) -> tuple[MovingBoundary, ...]:
+        """Of the fine field and of the coarse one."""
         return tuple(
             moving_boundary(self.mechanism, self.mode, field, component, self.floor)
             for field, component in zip(self.fields, self.components, strict=True)
@@ -42,7 +43,7 @@ class MovingFields:
         machine = neighbour.mechanism
         if self.of_region:
             region = neighbour.placed
-            fine, coarse = (field_near(b, machine, region.centre, region.half) for b in self._boundaries)
+            fine, coarse = (field_near(b, machine, region.centre, region.half) for b in self.boundaries)
         else:
-            fine, coarse = (mode_field_near(b, machine) for b in self._boundaries)
+            fine, coarse = (mode_field_near(b, machine) for b in self.boundaries)
         return fine, coarse

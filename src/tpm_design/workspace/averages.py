@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.indices import condition_at
+from tpm_design.workspace.rays import MOST_STEPS, next_share
 
 # along a segment, fine and coarse: 1/κ has kinks where singular values change places
 GAUSS_NODES = {"region": (8, 6), "aspect": (16, 12)}
@@ -29,7 +30,8 @@ class Averages:
 
 
 @inner
-def _at(geometry, mode, frobenius, motor, origin, step, t):  # type: ignore[no-untyped-def]
+def condition_along(geometry, mode, frobenius, motor, origin, step, t):  # type: ignore[no-untyped-def]
+    """1/κ on a ray."""
     return condition_at(
         geometry,
         mode,
@@ -42,14 +44,50 @@ def _at(geometry, mode, frobenius, motor, origin, step, t):  # type: ignore[no-u
 
 
 @inner
-def _threshold_crossing(geometry, mode, frobenius, motor, threshold, origin, step, low, high, below):  # type: ignore[no-untyped-def]
-    for _ in range(40):
-        t = 0.5 * (low + high)
-        if (_at(geometry, mode, frobenius, motor, origin, step, t) < threshold) == below:
-            low = t
+def _crossing(geometry, mode, frobenius, motor, threshold, origin, step, a, b, fa, fb):  # type: ignore[no-untyped-def]
+    """Ray parameter between ``a`` and ``b`` where 1/κ is the threshold; ``fa``, ``fb``: how far above."""
+    t = 0.5 * (a + b)
+    for _ in range(MOST_STEPS):
+        value = condition_along(geometry, mode, frobenius, motor, origin, step, t) - threshold
+        c, fc = a, fa
+        if (value >= 0.0) != (fa >= 0.0):
+            c, fc, b, fb = b, fb, a, fa
+        a, fa = t, value
+        tolerance = 1e-14 * max(abs(a), abs(b))
+        if fa == 0.0 or abs(b - a) <= tolerance:
+            break
+        t = a + next_share(a, fa, b, fb, c, fc, tolerance) * (b - a)
+    return a
+
+
+@inner
+def scanned(geometry, mode, frobenius, motor, threshold, origin, step, start, end, places, values, crossings):  # type: ignore[no-untyped-def]
+    """Write 1/κ just inside the start of a segment, at the places along it and just inside its end (P + 2),
+    and the ray parameters between these where it passes the threshold (up to P + 1), in order; how many."""
+    length = end - start
+    count, low = 0, start
+    for k in range(values.size):
+        if k == 0:
+            t = start + 1e-9 * length
+        elif k == values.size - 1:
+            t = end - 1e-9 * length
         else:
-            high = t
-    return 0.5 * (low + high)
+            t = start + length * places[k - 1]
+        values[k] = condition_along(geometry, mode, frobenius, motor, origin, step, t)
+        if k > 0 and (values[k] < threshold) != (values[k - 1] < threshold):
+            below, here = values[k - 1] - threshold, values[k] - threshold
+            crossings[count] = _crossing(
+                geometry, mode, frobenius, motor, threshold, origin, step, low, t, below, here
+            )
+            count += 1
+        low = t
+    return count
+
+
+@inner
+def step_of(scale, direction):  # type: ignore[no-untyped-def]
+    """What a unit of a ray's parameter is in metres."""
+    return scale[0] * direction[0], scale[1] * direction[1], scale[2] * direction[2]
 
 
 @inner
@@ -57,45 +95,31 @@ def _integrate(geometry, mode, frobenius, motor, threshold, origin, scale, field
     """Integrals of ``Averages`` over all segments of a field of the component wanted, −1: of all."""
     directions, weights, rays, starts, ends, component, wanted = field
     places, shares = nodes
+    values, crossings = np.empty(places.size + 2), np.empty(places.size + 1)
     volume, total, above, least = 0.0, 0.0, 0.0, math.inf
     for s in range(rays.size):
         if wanted >= 0 and component[s] != wanted:
             continue
-        ray = rays[s]
-        step = (
-            scale[0] * directions[ray, 0],
-            scale[1] * directions[ray, 1],
-            scale[2] * directions[ray, 2],
+        ray, start, end = rays[s], starts[s], ends[s]
+        step = step_of(scale, directions[ray])
+        count = scanned(
+            geometry, mode, frobenius, motor, threshold, origin, step, start, end, places, values, crossings
         )
-        start, length = starts[s], ends[s] - starts[s]
-        inside = 0.0
-        low = start
-        value = _at(geometry, mode, frobenius, motor, origin, step, start + 1e-9 * length)
-        least = min(least, value)
-        below = value < threshold
-        # ∫ t² dt over the parts above the threshold: + t³/3 where one ends, − t³/3 where one begins
-        if not below:
-            above -= weights[ray] * start**3 / 3.0
-        for k in range(places.size + 1):
-            t = ends[s] - 1e-9 * length if k == places.size else start + length * places[k]
-            value = _at(geometry, mode, frobenius, motor, origin, step, t)
+        for value in values:
             least = min(least, value)
-            if k < places.size:
-                inside += shares[k] * length * t * t * value
-            if (value < threshold) != below:
-                crossing = _threshold_crossing(
-                    geometry, mode, frobenius, motor, threshold, origin, step, low, t, below
-                )
-                if below:
-                    above -= weights[ray] * crossing**3 / 3.0
-                else:
-                    above += weights[ray] * crossing**3 / 3.0
-                below = not below
-            low = t
+        inside = 0.0
+        for k in range(places.size):
+            t = start + (end - start) * places[k]
+            inside += shares[k] * (end - start) * t * t * values[k + 1]
         total += weights[ray] * inside
-        volume += weights[ray] * (ends[s] ** 3 - start**3) / 3.0
-        if not below:
-            above += weights[ray] * ends[s] ** 3 / 3.0
+        volume += weights[ray] * (end**3 - start**3) / 3.0
+        # ∫ t² dt over the parts above the threshold: + t³/3 where one ends, − t³/3 where one begins
+        is_above = values[0] >= threshold
+        part = -(start**3) if is_above else 0.0
+        for k in range(count):
+            part += crossings[k] ** 3 if is_above else -(crossings[k] ** 3)
+            is_above = not is_above
+        above += weights[ray] * (part + (end**3 if is_above else 0.0)) / 3.0
     return volume, total, above, least
 
 
@@ -111,7 +135,7 @@ def _two_integrals(  # type: ignore[no-untyped-def]
 
 
 @cache
-def _nodes(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def ray_nodes(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Places in [0, 1] and weights, crowded at both ends of a segment."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     angles = 0.5 * np.pi * (nodes + 1.0)
@@ -143,7 +167,7 @@ def conditioning_averages(
         fields[0].origin,
         fields[0].scale,
         (_chosen(fields[0], largest), _chosen(fields[1], largest)),
-        (_nodes(nodes[0]), _nodes(nodes[1])),
+        (ray_nodes(nodes[0]), ray_nodes(nodes[1])),
     )
     cell = float(abs(np.prod(fields[0].scale)))
     fine, coarse = (

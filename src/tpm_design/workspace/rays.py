@@ -55,7 +55,7 @@ def _margins(geometry, mode, sided, poses, count, out):  # type: ignore[no-untyp
 
 
 @inner
-def _next_share(a, fa, b, fb, c, fc, tolerance):  # type: ignore[no-untyped-def]
+def next_share(a, fa, b, fb, c, fc, tolerance):  # type: ignore[no-untyped-def]
     """Where between ``a``, the newest point, and ``b``, of the other sign, to look next; ``c`` came before.
 
     T. R. Chandrupatla, A new hybrid quadratic/bisection algorithm, Adv. Eng. Softw. 28, 1997.
@@ -99,7 +99,7 @@ def _roots(geometry, mode, sided, origin, steps, changes, brackets, size, part_c
             brackets[i, 0], brackets[i, 1], brackets[i, 2], brackets[i, 3] = a, b, fa, fb
             tolerance = 1e-12 * max(abs(a), abs(b))
             if fa != 0.0 and abs(b - a) > tolerance:
-                t[i] = a + _next_share(a, fa, b, fb, c, fc, tolerance) * (b - a)
+                t[i] = a + next_share(a, fa, b, fb, c, fc, tolerance) * (b - a)
                 unfinished[kept] = i
                 kept += 1
             else:
