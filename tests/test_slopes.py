@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import tpm_design as tpm
+from tpm_design.metrics.base import Measurement
+from tpm_design.metrics.context import Context
 from tpm_design.optimizers.base import Slopes
 from tpm_design.optimizers.watch import Watch
 from tpm_design.problem import Evaluation, Problem, Sample
@@ -119,9 +120,13 @@ def test_slopes_of_samples(problem: Problem) -> None:
 
 
 def test_what_is_not_known_to_first_order_has_no_slopes(problem: Problem) -> None:
-    mean = tpm.load_study(Path(__file__).parents[1] / "studies" / "01-uru-cube.yaml").problem.record[0]
-    unsloped = replace(problem, constraints=(*problem.constraints, replace(mean, minimum=0.1)))
-    seen = view(unsloped)
+    *others, last = problem.constraints
+
+    def measured(context: Context, options: Mapping[str, Any]) -> Measurement:
+        return replace(last.metric.compute(context, options), near=None)
+
+    kept_to_itself = replace(last, metric=replace(last.metric, compute=measured))
+    seen = view(replace(problem, constraints=(*others, kept_to_itself)))
     point = inner_points(seen.dimension, 1, 3)[0]
     assert seen.evaluate_sloped(point[None, :], np.ones(1, dtype=np.bool_)).slopes == (None,)
 
