@@ -110,8 +110,8 @@ def descend(
     """Walk downhill from ``start`` in the variables ``free`` (their numbers), the others held.
 
     ``radius``: of the first trust region; ``fine``: of the last. ``abandoned``: asked at every new place
-    whether to give up. ``steps``: at most. ``blur``: where slopes are not known, differences are taken over
-    this share of the last step, at most its square.
+    whether to give up. ``steps``: at most. ``blur``: where slopes are not known, or this is more than
+    ``SHARP``, differences are taken over this share of the last step, at most its square.
 
     Sources: R. Fletcher, Practical methods of optimization, 1987, 14.4 (exact penalty in a trust region,
     correction of second order); M. J. D. Powell, 1978 (damped update of the curvature).
@@ -237,13 +237,16 @@ class _Descent:
         length = float(np.abs(step.step).max())
         self._failures += 1
         kinked = self._failures > 1 and length < KINKED
-        if (trial.slopes or kinked) and self._measure.shortfall(trial) > step.shortfall:
+        if (self._known(trial) or kinked) and self._measure.shortfall(trial) > step.shortfall:
             width, self._width = self._width, self._difference(length)
             beyond = yield from self._slopes(trial)
             self._width = width
             self._seen.append((trial, beyond.jacobian))
         self._radius = SHRINKING * min(self._radius, max(length, 0.1 * FINE))
-        if self._here.slopes is None and FINE < self._radius < 30.0 * self._width > 30.0 * FINEST_DIFFERENCE:
+        if (
+            self._known(self._here) is None
+            and FINE < self._radius < 30.0 * self._width > 30.0 * FINEST_DIFFERENCE
+        ):
             self._width = self._difference(self._radius)
             self._gradient, self._jacobian = yield from self._slopes_here()
 
@@ -288,7 +291,8 @@ class _Descent:
         return Landing(self._best, self._here, program, measure.weights, measure.height, measure.penalty)
 
     def _look(self, step: FloatArray) -> Generator[Question, Outcomes, Place]:
-        place = yield from looked_at(_moved(self._here.point, self._free, step))
+        point = _moved(self._here.point, self._free, step)
+        place = yield from looked_at(point, sloped=self._blur <= SHARP)
         self._check(place.constraints)
         return place
 
@@ -299,9 +303,9 @@ class _Descent:
     def _slopes(self, place: Place) -> Generator[Question, Outcomes, Slopes]:
         """In the free variables: those that are known, else difference quotients, towards the middle of the
         cube."""
-        free, each = self._free, np.arange(len(self._free))
-        if place.slopes is not None:
-            return Slopes(place.slopes.gradient[free], place.slopes.jacobian[:, free])
+        free, each, known = self._free, np.arange(len(self._free)), self._known(place)
+        if known is not None:
+            return Slopes(known.gradient[free], known.jacobian[:, free])
         points = np.tile(place.point, (len(free), 1))
         points[each, free] += np.where(place.point[free] > 0.5, -self._width, self._width)
         steps = points[each, free] - place.point[free]
@@ -309,6 +313,10 @@ class _Descent:
         self._check(found.constraints[0])
         gradient = (found.objective - place.objective) / steps
         return Slopes(gradient, ((found.constraints - place.constraints) / steps[:, None]).T)
+
+    def _known(self, place: Place) -> Slopes | None:
+        """Slopes as they are lead nowhere across small steps and kinks."""
+        return None if self._blur > SHARP else place.slopes
 
     def _difference(self, step: float) -> float:
         return float(np.clip(self._blur * step, FINEST_DIFFERENCE, self._blur**2))

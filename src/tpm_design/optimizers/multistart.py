@@ -183,14 +183,14 @@ class _Course:
 
     def _from_sample(self, sample: Place) -> Task:
         start = yield from looked_at(sample.point)
-        landing = yield from self._descended(start, RADIUS, SHARP)
+        landing = yield from self._descended(start, RADIUS)
         self._ended += 1
         yield from self._arrived(landing, independent=True)
 
     def _from_left(self, left: Place) -> Task:
         """From the best place that a search saw, where it went elsewhere and found nothing better."""
         start = yield from looked_at(left.point)
-        landing = yield from self._descended(start, AGAIN, SHARP)
+        landing = yield from self._descended(start, AGAIN)
         yield from self._arrived(landing, independent=False)
 
     def _hop(self, optimum: Optimum) -> Task:
@@ -198,11 +198,11 @@ class _Course:
         point = optimum.place.point.copy()
         point[self._free] += sigma * self._random.standard_normal(len(self._free))
         start = yield from looked_at(np.clip(point, 0.0, 1.0))
-        landing = yield from self._descended(start, 0.5 * RADIUS, BLURRED)
+        landing = yield from self._descended(start, 0.5 * RADIUS)
         yield from self._arrived(landing, independent=False)
 
     def _descended(self, start: Place, radius: float, blur: float) -> Generator[Question, Outcomes, Landing]:
-        landing = yield from descend(start, self._free, radius, self._known, COARSE, COARSE_STEPS, blur)
+        landing = yield from descend(start, self._free, radius, self._known, COARSE, COARSE_STEPS)
         if not len(self._free):
             landing = yield from descend_levels(landing, self._levels)
         return landing

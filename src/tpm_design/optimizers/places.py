@@ -66,8 +66,8 @@ def places(points: FloatArray, outcomes: Outcomes) -> list[Place]:
     ]
 
 
-def looked_at(point: FloatArray) -> Generator[Question, Outcomes, Place]:
+def looked_at(point: FloatArray, *, sloped: bool = True) -> Generator[Question, Outcomes, Place]:
     """The place at one point (n,), with its slopes."""
     points = point[None, :]
-    (place,) = places(points, (yield Question(points, sloped=True)))
+    (place,) = places(points, (yield Question(points, sloped)))
     return place
