@@ -284,3 +284,26 @@ def test_means_near(metric: str, over: str, norm: str) -> None:
         above, below = (METRICS[metric].compute(context(length, h), options).value for h in (1e-5, -1e-5))
         near = [measured.near(context(length, h)).value for h in (STEP, -STEP)]
         assert (near[0] - near[1]) / (2.0 * STEP) == pytest.approx((above - below) / 2e-5, rel=1e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize("metric", ["conditioning_mean", "conditioning_share", "robot_size"])
+@pytest.mark.parametrize("name", NAMES)
+def test_means_of_every_mechanism(name: str, metric: str) -> None:
+    """Over the largest aspect, 1/κ₂ among them constant (3-CRR): to 1e-6 of their size."""
+    parameters = random_parameters(name, 2)
+    drive = MECHANISMS[name].drives[0]
+    options = {"norm": "2", "drive": drive, "over": "aspect", "threshold": 0.25}
+
+    def context(length: str, limb: int, share: float) -> Context:
+        return Context(*machine(name, with_change(parameters, length, limb, share)), None, 1e-3, 9)
+
+    for length, limb in each_length(name, parameters)[:4]:
+        measured = METRICS[metric].compute(context(length, limb, 0.0), options)
+        assert measured.near is not None
+        above, below = (
+            METRICS[metric].compute(context(length, limb, h), options).value for h in (1e-5, -1e-5)
+        )
+        near = [measured.near(context(length, limb, h)).value for h in (STEP, -STEP)]
+        assert (near[0] - near[1]) / (2.0 * STEP) == pytest.approx(
+            (above - below) / 2e-5, abs=1e-6 * max(1.0, measured.value)
+        )

@@ -18,6 +18,7 @@ from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.averages import GAUSS_NODES, Averages, conditioning_averages
 from tpm_design.workspace.indices import CONDITION_2, CONDITION_FROBENIUS, Index, index_values
 from tpm_design.workspace.moving_level import MovingLevel, moving_level, volume_above_near
+from tpm_design.workspace.moving_mean import MovingMean, integral_near, moving_mean
 from tpm_design.workspace.region_geometry import POINTS
 
 SOURCE = "C. Gosselin, J. Angeles, A global performance index for the kinematic optimization, 1991"
@@ -93,26 +94,18 @@ def _at_points(context: Context, options: Mapping[str, Any]) -> np.ndarray:
 def _mean(context: Context, options: Mapping[str, Any]) -> Measurement:
     if options["over"] == "region" and context.placed.form == POINTS:
         return replace(_mean_at_points(options, context), near=partial(_mean_at_points, options))
+    fields = _fields(context, options)
+    fine, coarse = (
+        _share_of(options, each.conditioning, each.volume, field)
+        for each, field in zip(_averages(context, options, fields), fields, strict=True)
+    )
     moving = _moving(context, options)
-    near = None if moving is None else partial(_mean_near, moving, options)
-    return replace(_mean_of(context, options, _fields(context, options)), near=near)
+    near = None if moving is None else MovingConditioning(moving, options).mean_near
+    return Measurement(fine, abs(fine - coarse), near=near)
 
 
 def _mean_at_points(options: Mapping[str, Any], context: Context) -> Measurement:
     return Measurement(float(_at_points(context, options).mean()))
-
-
-def _mean_of(context: Context, options: Mapping[str, Any], fields: tuple[RayField, RayField]) -> Measurement:
-    found = _averages(context, options, fields)
-    fine, coarse = (
-        _share_of(options, each.conditioning, each.volume, field)
-        for each, field in zip(found, fields, strict=True)
-    )
-    return Measurement(fine, abs(fine - coarse))
-
-
-def _mean_near(moving: MovingFields, options: Mapping[str, Any], neighbour: Context) -> Measurement:
-    return _mean_of(neighbour, options, moving.near(neighbour))
 
 
 def _share(context: Context, options: Mapping[str, Any]) -> Measurement:
@@ -125,43 +118,71 @@ def _share(context: Context, options: Mapping[str, Any]) -> Measurement:
         _share_of(options, each.above, each.volume, field) for each, field in zip(found, fields, strict=True)
     )
     moving = _moving(context, options)
-    near = None if moving is None else MovingShare(moving, options).near
+    near = None if moving is None else MovingConditioning(moving, options).share_near
     return Measurement(fine, abs(fine - coarse), near=near)
 
 
 @dataclass(frozen=True)
-class MovingShare:
-    """The share of a design's ``moving`` fields above a threshold, for its neighbours. Where 1/κ passes the
-    threshold is found when one first asks."""
+class MovingConditioning:
+    """1/κ in the ``moving`` fields of a design, for its neighbours. Singular vectors, and where 1/κ passes
+    the threshold, are found when one first asks."""
 
     moving: MovingFields
     options: Mapping[str, Any]
 
     @cached_property
-    def _levels(self) -> tuple[MovingLevel, ...]:
+    def _means(self) -> tuple[MovingMean, ...]:
+        machine, mode = self.moving.mechanism, self.moving.mode
+        frobenius, motor = self.options["norm"] == "frobenius", machine.motor_weight(self.options["drive"])
+        nodes = GAUSS_NODES[self.options["over"]]
         return tuple(
-            moving_level(
-                self.moving.mechanism,
-                self.moving.mode,
-                boundary.field,
-                frobenius=self.options["norm"] == "frobenius",
-                motor=self.moving.mechanism.motor_weight(self.options["drive"]),
-                threshold=self.options["threshold"],
-                nodes=nodes,
-            )
-            for boundary, nodes in zip(self.moving.boundaries, GAUSS_NODES[self.options["over"]], strict=True)
+            moving_mean(machine, mode, boundary.field, frobenius=frobenius, motor=motor, nodes=count)
+            for boundary, count in zip(self.moving.boundaries, nodes, strict=True)
         )
 
-    def near(self, neighbour: Context) -> Measurement:
-        fields = self.moving.near(neighbour)
-        fine, coarse = (
-            _share_of(
-                self.options,
-                volume_above_near(level, neighbour.mechanism, field),
-                float(np.sum(field.volumes)),
-                field,
+    @cached_property
+    def _levels(self) -> tuple[MovingLevel, ...]:
+        machine, mode = self.moving.mechanism, self.moving.mode
+        frobenius, motor = self.options["norm"] == "frobenius", machine.motor_weight(self.options["drive"])
+        nodes = GAUSS_NODES[self.options["over"]]
+        threshold = self.options["threshold"]
+        return tuple(
+            moving_level(
+                machine,
+                mode,
+                boundary.field,
+                frobenius=frobenius,
+                motor=motor,
+                threshold=threshold,
+                nodes=count,
             )
-            for level, field in zip(self._levels, fields, strict=True)
+            for boundary, count in zip(self.moving.boundaries, nodes, strict=True)
+        )
+
+    def mean_near(self, neighbour: Context) -> Measurement:
+        fields = self.moving.near(neighbour)
+        return self._shares(
+            fields,
+            [
+                integral_near(mean, neighbour.mechanism, field)
+                for mean, field in zip(self._means, fields, strict=True)
+            ],
+        )
+
+    def share_near(self, neighbour: Context) -> Measurement:
+        fields = self.moving.near(neighbour)
+        return self._shares(
+            fields,
+            [
+                volume_above_near(level, neighbour.mechanism, field)
+                for level, field in zip(self._levels, fields, strict=True)
+            ],
+        )
+
+    def _shares(self, fields: tuple[RayField, RayField], integrals: list[float]) -> Measurement:
+        fine, coarse = (
+            _share_of(self.options, integral, float(np.sum(field.volumes)), field)
+            for integral, field in zip(integrals, fields, strict=True)
         )
         return Measurement(fine, abs(fine - coarse))
 
