@@ -23,9 +23,7 @@ from tpm_design.report.symbols import mathematics
 from tpm_design.report.viewpoint import best_viewpoint
 from tpm_design.units import Units
 
-KINDS = [
-    pytest.param(kind, id=kind.name, marks=pytest.mark.xdist_group(kind.name)) for kind in MECHANISMS.values()
-]
+KINDS = [pytest.param(kind, id=kind.name) for kind in MECHANISMS.values()]
 
 
 @pytest.fixture(params=KINDS)

@@ -75,6 +75,7 @@ def test_the_octant_of_a_ball(name: str) -> None:
     assert found is not None and found.gap is not None and found.gap < PRECISE
 
 
+@pytest.mark.xdist_group("crr")
 @pytest.mark.parametrize("name", ["box", "ellipsoid"])
 def test_three_cylinders(name: str) -> None:
     found = largest_body(*three_cylinders(0.6, 0.6, fold=False), name)

@@ -24,6 +24,9 @@ from tpm_design.runs.search import Entry, best_entry
 from tpm_design.study import Study, load_study
 from tpm_design.study.actions import Run, evaluations_frame
 
+# one worker compiles the kernels of all proofs of 3-URUs
+pytestmark = pytest.mark.xdist_group("uru")
+
 WITHIN = {"f": 1e-4, "r": 1e-4}
 
 

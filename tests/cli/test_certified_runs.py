@@ -10,6 +10,9 @@ from command_line import Outcome, tpm_design, written
 
 from small_studies import CERTIFIED
 
+# one worker compiles the kernels of all proofs of 3-URUs
+pytestmark = pytest.mark.xdist_group("uru")
+
 
 def optimized(folder: Path, text: str, *options: str) -> Outcome:
     return tpm_design("optimize", written(folder, text), "--output", folder, "--workers", "1", "-q", *options)

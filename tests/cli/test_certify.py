@@ -6,7 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-from command_line import process, tpm_design, written
+from command_line import tpm_design, written
+
+# one worker compiles the kernels of all proofs of 3-URUs
+pytestmark = pytest.mark.xdist_group("uru")
 
 STUDY = """\
 version: 1
@@ -56,15 +59,19 @@ def test_a_refuted_requirement_has_its_own_exit_code(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
-def test_the_certificate_of_a_study_lies_where_the_command_was_given(tmp_path: Path) -> None:
+def test_the_certificate_of_a_study_lies_where_the_command_was_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     written(tmp_path, STUDY)
-    done = process(["certify", "study.yaml", "--set", "f=245", "--quiet"], tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = tpm_design("certify", "study.yaml", "--set", "f=245", "--quiet")
+    assert done.code == 0, done.errors
     assert json.loads((tmp_path / "certificate.json").read_text(encoding="utf-8"))["design"]["f"] == 0.245
 
 
 def test_the_largest_tolerance_is_printed_for_the_drawing(tmp_path: Path) -> None:
-    done = tpm_design("certify", written(tmp_path, STUDY), "--max-tolerance", "--json")
+    text = STUDY.replace("certify: {", "certify: {boxes: 5000, ")
+    done = tpm_design("certify", written(tmp_path, text), "--max-tolerance", "--json")
     data = json.loads(done.output)
     assert done.code == 0
     assert data["tolerance"]["f"]["unit"] == "mm"
@@ -89,13 +96,20 @@ def test_the_largest_tolerance_is_printed_for_the_drawing(tmp_path: Path) -> Non
     ],
 )
 def test_wrong_usage_is_one_message(
-    tmp_path: Path, arguments: list[str], change: tuple[str, str] | None, expected: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    change: tuple[str, str] | None,
+    expected: str,
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     written(tmp_path, STUDY.replace(*change) if change else STUDY)
-    done = process(["certify", *("study.yaml" if a == "STUDY" else a for a in arguments)], tmp_path)
-    assert done.returncode == 2
-    assert expected in done.stderr
-    assert "Traceback" not in done.stderr
+    done = tpm_design("certify", *("study.yaml" if a == "STUDY" else a for a in arguments))
+    assert done.code == 2
+    assert expected in done.errors
+    assert "Traceback" not in done.errors
+    # nothing was proved in vain
+    assert "Proving" not in done.errors
 
 
 def test_a_study_without_constraints_has_nothing_to_prove(tmp_path: Path) -> None:

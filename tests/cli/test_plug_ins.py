@@ -59,6 +59,10 @@ def written(folder: Path, source: str = GANTRY, study: str = STUDY, name: str = 
     return folder
 
 
+# what processes compile beside plug-ins is kept by one worker
+pytestmark = pytest.mark.xdist_group("plug_ins")
+
+
 def plug_ins() -> list[str]:
     """Modules of this process that are plug-ins."""
     return [name for name in sys.modules if name.startswith(PLUG_IN)]

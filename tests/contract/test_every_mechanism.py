@@ -10,10 +10,7 @@ from tpm_design.mechanisms import MECHANISMS
 from tpm_design.mechanisms.base import MechanismKind, Parameter
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 
-# the kernels of one mechanism are compiled by one worker
-KINDS = [
-    pytest.param(kind, id=kind.name, marks=pytest.mark.xdist_group(kind.name)) for kind in MECHANISMS.values()
-]
+KINDS = [pytest.param(kind, id=kind.name) for kind in MECHANISMS.values()]
 
 
 def first_mode(mechanism: Mechanism) -> Mode:

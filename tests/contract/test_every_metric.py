@@ -76,12 +76,7 @@ def design_at(kind: MechanismKind, factor: float) -> Design:
     return {**kind.example, **{name: placed[name] for name in kind.centre_names}, "mode": "+"}
 
 
-@pytest.fixture(
-    params=[
-        pytest.param(kind, id=kind.name, marks=pytest.mark.xdist_group(kind.name))
-        for kind in MECHANISMS.values()
-    ]
-)
+@pytest.fixture(params=[pytest.param(kind, id=kind.name) for kind in MECHANISMS.values()])
 def kind(request: pytest.FixtureRequest) -> MechanismKind:
     found: MechanismKind = request.param
     return found

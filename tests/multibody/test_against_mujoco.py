@@ -92,11 +92,7 @@ def test_the_constraints_leave_the_motions_of_the_jacobian(number: int, drive: s
 
 @pytest.mark.parametrize(
     ("kind", "determinant", "locked"),
-    [
-        pytest.param(*crossed, id="-".join(crossed[:2]), marks=pytest.mark.xdist_group(crossed[0]))
-        for crossed in CROSSED
-        if crossed[0] in MECHANISMS
-    ],
+    [pytest.param(*crossed, id="-".join(crossed[:2])) for crossed in CROSSED if crossed[0] in MECHANISMS],
 )
 def test_a_motion_more_where_a_determinant_vanishes(kind: str, determinant: str, locked: str | None) -> None:
     random = np.random.default_rng(8)

@@ -107,12 +107,23 @@ def _plain(value: Any) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
-def write_document(path: Path, data: Mapping[str, Any]) -> None:
-    """Write a certificate, whole or not at all. Raises UsageError where it cannot be written."""
+def check_place(path: Path) -> None:
+    """Raises UsageError where there can be no certificate: to be asked before a long proof."""
     if not path.name or path.is_dir():
         raise UsageError(
             "The certificate needs a file name.", where=str(path), remedy="Write --output certificate.json."
         )
+    if not path.absolute().parent.is_dir():
+        raise UsageError(
+            f"The certificate cannot be written: there is no folder {path.parent}.",
+            where=str(path),
+            remedy="Choose another place with --output.",
+        )
+
+
+def write_document(path: Path, data: Mapping[str, Any]) -> None:
+    """Write a certificate, whole or not at all. Raises UsageError where it cannot be written."""
+    check_place(path)
     part = path.with_name(path.name + ".part")
     try:
         part.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tpm_design.certificates.document import FILE, document, write_document
+from tpm_design.certificates.document import FILE, check_place, document, write_document
 from tpm_design.certificates.tolerances import LargestTolerance, largest_tolerance
 from tpm_design.certificates.verdict import Requirement, Verdict, verdict
 from tpm_design.checker import Progress, check_certificate
@@ -65,11 +65,12 @@ def certify_one(
         print("Assumed: " + "; ".join(assumptions) + ".\n")
     if max_tolerance:
         return _largest(study, design, threads, as_json=as_json, quiet=quiet)
+    target = output or (path / FILE if path.is_dir() and not settings else Path(FILE))
+    check_place(target)
     asked_for = study.certification or NOTHING_ASKED
     if not (quiet or as_json):
         print("Proving; the equations are compiled on first use, for up to a minute.", file=sys.stderr)
     found = verdict(study.problem, design, asked_for.tolerance, boxes=asked_for.boxes, workers=threads)
-    target = output or (path / FILE if path.is_dir() and not settings else Path(FILE))
     write_document(target, document(study.problem, study.resolved(), study.study_hash, found))
     if as_json:
         print(json.dumps(verdict_data(study, found) | {"certificate": str(target)}, ensure_ascii=False))
