@@ -201,7 +201,7 @@ class _Course:
         landing = yield from self._descended(start, 0.5 * RADIUS)
         yield from self._arrived(landing, independent=False)
 
-    def _descended(self, start: Place, radius: float, blur: float) -> Generator[Question, Outcomes, Landing]:
+    def _descended(self, start: Place, radius: float) -> Generator[Question, Outcomes, Landing]:
         landing = yield from descend(start, self._free, radius, self._known, COARSE, COARSE_STEPS)
         if not len(self._free):
             landing = yield from descend_levels(landing, self._levels)
