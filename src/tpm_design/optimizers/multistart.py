@@ -16,8 +16,9 @@ from tpm_design.optimizers.places import Place, Question, answered, looked_at, p
 from tpm_design.optimizers.starts import Starts, are_one, choice_of
 from tpm_design.optimizers.watch import Watch
 
-ABREAST = 4
-"""Local searches under way at a time."""
+ABREAST, SLOPED_ABREAST = 4, 8
+"""Local searches under way at a time: each asks for a point for every variable where slopes are not known,
+otherwise for one."""
 
 FIRST_STARTS = 4
 """Starts from the sample before the best optimum is looked at more closely."""
@@ -130,12 +131,13 @@ class _Course:
         self._begun = self._ended = self._landed = self._hops = 0
         self._finishing = False
         self._left: list[Place] = []
+        self._abreast = ABREAST
 
     def run(self) -> str:
         self._starts.sample()
         under_way: list[_UnderWay] = []
         while not self._few_left() and not self._converged():
-            while len(under_way) < ABREAST:
+            while len(under_way) < self._abreast:
                 task = self._next_task()
                 if (first := next(task, None)) is not None:
                     under_way.append(_UnderWay(task, first))
@@ -158,6 +160,8 @@ class _Course:
             if pieces.constraint_count != self._pieces.constraint_count:
                 self._pieces = Watch(pieces)
                 found = answered(self._pieces, questions)
+        if any(known is not None for outcomes in found for known in outcomes.slopes):
+            self._abreast = SLOPED_ABREAST
         return found
 
     # ------------------------------------------------------------------------------ what is begun

@@ -13,7 +13,7 @@ from tpm_design.optimizers.base import FloatArray
 from tpm_design.optimizers.places import Place, places
 from tpm_design.optimizers.watch import Watch
 
-SAMPLES = 24
+SAMPLES = 12
 """Points of the first sample for each variable and one more, at least; further samples are as large."""
 
 KEPT = 0.25
