@@ -106,6 +106,30 @@ def test_slopes_go_by_the_coordinates_of_the_cube(problem: Problem) -> None:
     agree_where_smooth(seen, inner_points(seen.dimension, 25, 1), least=0.95)
 
 
+def test_slopes_that_are_known_serve_a_search_of_a_part_of_the_ranges(problem: Problem) -> None:
+    """As a polish does: the same designs, other coordinates."""
+    # of lengths alone, and halves, so that the design comes back from its coordinates with the same bits
+    linear = tuple(
+        replace(variable, ratio_of=None, scale="linear", lower=0.25, upper=0.5)
+        if variable.name in ("db", "dp", "f")
+        else variable
+        for variable in problem.variables
+    )
+    seen = view(replace(problem, variables=linear))
+    point = np.full(seen.dimension, 0.25)
+    whole = slopes_at(seen, point)
+    design = seen.space.design(point)
+    (entry,) = [entry for entry in seen.log.entries if entry.evaluation.design == design]
+    part = seen.continuous_near(entry, 0.125, 10_000)
+    count = len(seen.log.entries)
+    narrow = slopes_at(part, part.space.point(design))
+    assert len(seen.log.entries) == count
+    continuous = [number for number, levels in enumerate(seen.levels) if not levels]
+    assert narrow.gradient == pytest.approx(0.25 * whole.gradient[continuous], rel=1e-5, abs=1e-9)
+    assert narrow.jacobian == pytest.approx(0.25 * whole.jacobian[:, continuous], rel=1e-5, abs=1e-9)
+    agree_where_smooth(part, inner_points(part.dimension, 4, 7), least=0.9)
+
+
 def test_slopes_of_samples(problem: Problem) -> None:
     """Other machines than the nominal one, over the region and at a pose, judged with a margin."""
     offsets = {"f": (1e-3, 0.0, -1e-3)}

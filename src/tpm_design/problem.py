@@ -111,7 +111,8 @@ class Cutoff:
 
 @dataclass(frozen=True)
 class Neighbour:
-    """A design next to another one: ``step`` of the unit cube away from it along one free variable."""
+    """A design next to another one: ``step`` away from it along one continuous variable, in the variable's
+    SI unit, or of the multiple where it is a ratio; not 0."""
 
     design: Design
     step: float
@@ -121,7 +122,7 @@ Neighbours = Sequence[Neighbour]
 
 Slopes = Mapping[str, tuple[tuple[float, ...], ...]]
 """Label → of each of its pieces (constraints: of the slacks; an objective without pieces: of its value) the
-derivative along each neighbour's variable, SI per unit of the cube. Missing: not known to first order."""
+derivative along each neighbour's variable, SI. Missing: not known to first order."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.design_space import DesignSpace
+from tpm_design.design_space import DesignSpace, value_at
 from tpm_design.optimizers.base import BudgetSpent, Outcomes, Slopes
 from tpm_design.problem import (
     Cutoff,
@@ -239,24 +239,40 @@ class UnitSearch:
         ]
         results = self.log.evaluations(designs, self.limit, neighbours=around)
         found = outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
-        continuous = [number for number, count in enumerate(self.levels) if count == 0]
         return replace(
             found,
             slopes=tuple(
-                slopes_of(self.log.problem, result, self.sizes, continuous, self.dimension) if asked else None
-                for result, asked in zip(results, sloped, strict=True)
+                slopes_of(self.log.problem, result, self.sizes, self._rates(point)) if asked else None
+                for point, result, asked in zip(table, results, sloped, strict=True)
             ),
         )
 
     def _neighbours(self, point: FloatArray) -> Neighbours:
-        """One along each continuous variable, towards the middle of the cube."""
+        """One along each continuous variable."""
         found = []
-        for number, count in enumerate(self.levels):
-            if count == 0:
+        for number, step in enumerate(self._steps(point)):
+            if step:
                 moved = point.copy()
-                moved[number] += -SLOPE_STEP if point[number] > 0.5 else SLOPE_STEP
-                found.append(Neighbour(self.space.design(moved), float(moved[number] - point[number])))
+                moved[number] += step
+                found.append(Neighbour(self.space.design(moved), self._change(number, point, step)))
         return tuple(found)
+
+    def _steps(self, point: FloatArray) -> FloatArray:
+        """Those to the neighbours (n,): towards the middle of the cube, 0 along discrete variables."""
+        continuous = np.array([count == 0 for count in self.levels])
+        return np.where(continuous, np.where(point > 0.5, -SLOPE_STEP, SLOPE_STEP), 0.0)
+
+    def _change(self, number: int, point: FloatArray, step: float) -> float:
+        """Of a variable's value over a step of its coordinate."""
+        variable, coordinate = self.space.variables[number], float(point[number])
+        return float(value_at(variable, coordinate + step)) - float(value_at(variable, coordinate))
+
+    def _rates(self, point: FloatArray) -> FloatArray:
+        """By which values grow with their coordinates (n,): 0 along discrete variables."""
+        steps = self._steps(point)
+        return np.array(
+            [self._change(n, point, step) / step if step else 0.0 for n, step in enumerate(steps)]
+        )
 
     def screen(self, points: FloatArray, keep: int) -> Outcomes:
         """As ``ScreeningSearch``. The cutoff of each ``SCREENED`` points is the best ``keep``-th of those
@@ -418,19 +434,18 @@ def outcomes(
     return Outcomes(objective, constraints, merit, aborted, objectives=objectives, objective_pieces=pieces)
 
 
-def slopes_of(
-    problem: Problem, result: Evaluation, sizes: Sequence[int], continuous: Sequence[int], dimension: int
-) -> Slopes | None:
+def slopes_of(problem: Problem, result: Evaluation, sizes: Sequence[int], rates: FloatArray) -> Slopes | None:
     """Of the objective and of constraints in so many pieces, as ``outcomes`` gives them; None where one is
-    not known."""
+    not known. ``rates`` (n,): by which variables grow with their coordinates, 0 for discrete ones."""
     goal, known = problem.objectives[0], result.slopes
     labels = (goal.label, *(constraint.label for constraint in problem.constraints))
     if known is None or any(label not in known for label in labels):
         return None
-    gradient = np.zeros(dimension)
+    continuous = rates != 0.0
+    gradient = np.zeros(len(rates))
     sign = (1.0 if goal.sense == "minimize" else -1.0) / goal.metric.scale
     gradient[continuous] = sign * np.array(known[goal.label][0])
-    jacobian = np.zeros((sum(sizes), dimension))
+    jacobian = np.zeros((sum(sizes), len(rates)))
     first = 0
     for constraint, size in zip(problem.constraints, sizes, strict=True):
         rows = np.array(known[constraint.label]) / constraint.metric.scale
@@ -439,7 +454,7 @@ def slopes_of(
             rows = rows[int(np.argmin(pieces))]
         jacobian[first : first + size, continuous] = rows
         first += size
-    return Slopes(gradient, jacobian)
+    return Slopes(gradient * rates, jacobian * rates)
 
 
 def _objective_pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:
