@@ -112,9 +112,10 @@ def test_slopes_are_those_of_the_distance(name: str) -> None:
             asked += here.notes["locus"] == locus
             if here.near is None:
                 continue
+            if here.notes["locus"] != locus:
+                continue
             found += 1
             assert here.near(own).value == here.value
-            assert here.near(own).notes == here.notes
             motion = locus_motion(own.mechanism, own.mode, own.placed, part, own.locus_distance(part))
             assert motion is not None
             drawn = random.normal(size=len(values))
@@ -191,14 +192,23 @@ def test_no_slope_where_the_point_is_not_the_nearest() -> None:
     assert own_motion(context, LocusDistance(np.inf, 0.0, None)) is None
 
 
-def test_no_slope_out_of_reach_and_without_a_locus() -> None:
-    assert measured(uru_context(Sphere(0.1), (0.9, 0.9, 0.9)), "rotation").near is None
+def test_out_of_reach_and_without_a_locus_slopes_are_those_of_what_stands_for_the_distance() -> None:
+    beyond = uru_context(Sphere(0.1), (0.9, 0.9, 0.9))
+    farther = uru_context(Sphere(0.1), (0.9, 0.9, 0.9 + 1e-7))
+    here = measured(beyond, "rotation")
+    assert here.near is not None
+    assert here.near(beyond).value == pytest.approx(here.value, abs=1e-12)
+    change = farther.reach.value - beyond.reach.value
+    assert here.near(farther).value - here.near(beyond).value == pytest.approx(change, abs=1e-12)
     # k = 1, elbows as the octant: det W keeps its sign throughout
     built = mechanism("uru", db=0.1, dp=0.1, f=0.8, r=0.8, k=1.0)
     mode = built.mode_of({"octant": "+++", "elbows": "+++"})
-    none = measured(Context(built, mode, place(Sphere(0.15), (0.5, 0.45, 0.6)), 1e-3, 9), "actuation")
+    larger = mechanism("uru", db=0.1001, dp=0.1, f=0.8, r=0.8, k=1.0)
+    none_context = Context(built, mode, place(Sphere(0.15), (0.5, 0.45, 0.6)), 1e-3, 9)
+    none = measured(none_context, "actuation")
     assert none.notes["locus"] == "none"
-    assert none.near is None
+    assert none.near is not None
+    assert none.near(replace(none_context, mechanism=larger)).value > none.value
 
 
 @pytest.mark.parametrize("shape", [*SHAPES.values(), Ellipsoid((0.06, 0.06, 0.1))], ids=str)
