@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from tpm_design.errors import UsageError
+from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.mechanisms import mechanism_kind
 from tpm_design.metrics.context import Context
-from tpm_design.problem import Goal, evaluate
+from tpm_design.problem import Goal
 from tpm_design.report import write_report
 from tpm_design.report.aspect import choose_aspect, middle_of
 from tpm_design.report.escape import code, code_cell, table, text

@@ -19,18 +19,13 @@ from numpy.typing import NDArray
 
 import tpm_design as tpm
 from tpm_design.cli.app import app
+from tpm_design.evaluation.cutoffs import is_worse
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.evaluation.goals import scaled_objective
+from tpm_design.evaluation.result import Cutoff, Evaluation
 from tpm_design.optimizers.base import BudgetSpent, ScreeningSearch
 from tpm_design.optimizers.watch import Watch
-from tpm_design.problem import (
-    Cutoff,
-    Design,
-    Evaluation,
-    Problem,
-    Sample,
-    evaluate,
-    is_worse,
-    scaled_objective,
-)
+from tpm_design.problem import Design, Problem, Sample
 from tpm_design.report.history import history
 from tpm_design.runs.folder import RunWriter, entry_from_json, entry_to_json, read_run
 from tpm_design.runs.optimize import view_of

@@ -11,8 +11,9 @@ import pytest
 
 from tpm_design.design_space import DesignSpace, octant_signs
 from tpm_design.errors import RefusedError
+from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.optimizers.base import BudgetSpent
-from tpm_design.problem import Accuracy, Problem, Variable, evaluate
+from tpm_design.problem import Accuracy, Problem, Variable
 from tpm_design.runs.optimize import SearchPlan, SearchResult, search
 from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch
 from tpm_design.study import load_study

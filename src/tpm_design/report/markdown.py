@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from tpm_design.certificates.document import FILE as CERTIFICATE
-from tpm_design.problem import Evaluation, Goal
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.problem import Goal
 from tpm_design.report.certified import certificate_lines
 from tpm_design.report.escape import code, code_cell, table, text
 from tpm_design.report.figures import DRAWING, FIGURES, Picture

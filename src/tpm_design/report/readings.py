@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 
 from tpm_design.design_space import coordinate_of
-from tpm_design.problem import Evaluation, Goal, Problem, Variable
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.problem import Goal, Problem, Variable
 from tpm_design.runs.optimize import binding
 from tpm_design.runs.search import Entry
 

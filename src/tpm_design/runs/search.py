@@ -15,20 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.design_space import DesignSpace
+from tpm_design.evaluation.cutoffs import is_worse
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.evaluation.goals import scaled_objective
+from tpm_design.evaluation.result import Cutoff, Evaluation
+from tpm_design.evaluation.slopes import Neighbour, Neighbours
 from tpm_design.optimizers.base import BudgetSpent, Outcomes, Slopes
-from tpm_design.problem import (
-    Cutoff,
-    Design,
-    Evaluation,
-    Goal,
-    Neighbour,
-    Neighbours,
-    Problem,
-    Sample,
-    evaluate,
-    is_worse,
-    scaled_objective,
-)
+from tpm_design.problem import Design, Goal, Problem, Sample
 from tpm_design.runs.executors import Executor, Threads, in_order
 from tpm_design.runs.front import knee, non_dominated
 from tpm_design.synthesis.bound import relaxed_designs
