@@ -28,7 +28,8 @@ from tpm_design.evaluation.result import Evaluation
 from tpm_design.optimizers import OPTIMIZERS, default_method
 from tpm_design.problem import Problem
 from tpm_design.runs.optimize import SearchPlan, search
-from tpm_design.runs.search import minimised, outcomes
+from tpm_design.runs.outcomes import outcomes
+from tpm_design.runs.ranking import minimised
 from tpm_design.study.model import OptimizerModel
 
 WITHIN = 1e-3

@@ -38,8 +38,8 @@ from tpm_design.report.slices import (
     zero_lines,
 )
 from tpm_design.report.survey import conditioning_shown, survey
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import DESIGNS, LOG, SUMMARY, TABLE, RunWriter
-from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import goal_unit
 from tpm_design.study import Study, choose_design, dump_yaml, load_study
 from tpm_design.workspace.indices import CONDITION_2, CONDITION_FROBENIUS, Index

@@ -28,7 +28,7 @@ from tpm_design.runs.executors import SWITCH_INTERVAL, Executor
 from tpm_design.runs.folder import STUDY, newest_run, read_run
 from tpm_design.runs.optimality import gap_of
 from tpm_design.runs.optimize import check_plan
-from tpm_design.runs.search import best_entry
+from tpm_design.runs.ranking import best_entry
 from tpm_design.study import (
     Study,
     choose_design,

@@ -25,8 +25,8 @@ from tpm_design.report.words import (
     range_text,
     shape_text,
 )
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import DESIGNS, LOG, STUDY, SUMMARY, TABLE
-from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import goal_unit, parameter_columns
 
 NONE = "–"

@@ -9,8 +9,9 @@ from tpm_design.errors import ParameterError
 from tpm_design.evaluation.contexts import design_context
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Problem
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import STUDY, StoredRun, read_run
-from tpm_design.runs.search import Entry, best_entry, front_entries
+from tpm_design.runs.ranking import best_entry, front_entries
 from tpm_design.study import Study, load_study
 from tpm_design.study.sweep_points import sweep_points
 

@@ -17,6 +17,7 @@ from tpm_design.errors import UsageError, did_you_mean
 from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.problem import Design
+from tpm_design.runs.entry import Entry, answer_key
 from tpm_design.runs.executors import Executor
 from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run, text_hash
 from tpm_design.runs.lock import sole_writer
@@ -26,7 +27,6 @@ from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, searc
 from tpm_design.runs.proved_knee import with_proved_knee
 from tpm_design.runs.replay import answers_in
 from tpm_design.runs.rounds import Proving, search_certified
-from tpm_design.runs.search import Entry, answer_key
 from tpm_design.runs.tables import EvaluationTable, csv_line
 from tpm_design.study.design import completed_design, tied_error
 from tpm_design.study.plain import dump_yaml
