@@ -17,11 +17,13 @@ from subprocess import DEVNULL, Popen
 import psutil
 
 from row import Row
-from tpm_design.problem import Evaluation, Problem, evaluate
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.problem import Problem
 from tpm_design.runs.dask_workers import dask_workers
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.executors import SWITCH_INTERVAL, Executor, Threads, in_order
 from tpm_design.runs.folder import RunWriter
-from tpm_design.runs.search import Entry
 from tpm_design.study import load_study
 from workers import slow_points
 

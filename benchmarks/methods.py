@@ -23,10 +23,13 @@ import numpy as np
 
 from known_optima import KnownOptimum, known_optima
 from tpm_design.design_space import DesignSpace, octant_signs
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.evaluation.result import Evaluation
 from tpm_design.optimizers import OPTIMIZERS, default_method
-from tpm_design.problem import Evaluation, Problem, evaluate
+from tpm_design.problem import Problem
 from tpm_design.runs.optimize import SearchPlan, search
-from tpm_design.runs.search import minimised, outcomes
+from tpm_design.runs.outcomes import outcomes
+from tpm_design.runs.ranking import minimised
 from tpm_design.study.model import OptimizerModel
 
 WITHIN = 1e-3

@@ -8,8 +8,9 @@ from scipy.stats import qmc
 
 from row import Row, interleaved, seconds
 from tpm_design.problem import Problem
+from tpm_design.runs.log import EvaluationLog
 from tpm_design.runs.optimize import view_of
-from tpm_design.runs.search import EvaluationLog, UnitSearch
+from tpm_design.runs.unit_search import UnitSearch
 from tpm_design.study import load_study
 
 STUDIES = Path(__file__).resolve().parents[1] / "studies"

@@ -32,6 +32,7 @@ ROOMS = (
     "metrics",
     "problem",
     "design_space",
+    "evaluation",
     "certificates",
     "optimizers",
     "synthesis",

@@ -21,8 +21,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tpm_design.errors import RefusedError, RunStoppedError
+from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.mechanisms import MECHANISMS
-from tpm_design.problem import Problem, evaluate
+from tpm_design.problem import Problem
 from tpm_design.runs.dask_workers import CHUNK_SECONDS, HANDLING_SECONDS, DaskWorkers
 from tpm_design.runs.executors import SWITCH_INTERVAL, Threads, in_order
 from tpm_design.runs.shipping import carried_out, packed, portable, unpacked

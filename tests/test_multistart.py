@@ -24,10 +24,10 @@ from tpm_design.optimizers.descent import Walk, descend
 from tpm_design.optimizers.places import looked_at
 from tpm_design.optimizers.quadratic import Program, elastic_step
 from tpm_design.optimizers.starts import SAME
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import entry_to_json, read_run
 from tpm_design.runs.optima import distinct_optima
 from tpm_design.runs.optimize import SearchPlan, search, space_of
-from tpm_design.runs.search import Entry
 from tpm_design.study import load_study
 
 STUDY = (

@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from tpm_design.errors import UsageError
+from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.mechanisms import mechanism_kind
 from tpm_design.metrics.context import Context
-from tpm_design.problem import Goal, evaluate
+from tpm_design.problem import Goal
 from tpm_design.report import write_report
 from tpm_design.report.aspect import choose_aspect, middle_of
 from tpm_design.report.escape import code, code_cell, table, text
@@ -37,8 +38,8 @@ from tpm_design.report.slices import (
     zero_lines,
 )
 from tpm_design.report.survey import conditioning_shown, survey
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import DESIGNS, LOG, SUMMARY, TABLE, RunWriter
-from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import goal_unit
 from tpm_design.study import Study, choose_design, dump_yaml, load_study
 from tpm_design.workspace.indices import CONDITION_2, CONDITION_FROBENIUS, Index

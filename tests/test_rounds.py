@@ -15,12 +15,15 @@ import pytest
 from small_studies import CERTIFIED
 from tpm_design.certificates.document import FILE
 from tpm_design.certificates.verdict import Verdict, verdict
-from tpm_design.problem import Problem, Sample, design_context, evaluate, offset_mechanism
+from tpm_design.evaluation.contexts import design_context, offset_mechanism
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.problem import Problem, Sample
 from tpm_design.report import write_report
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import entry_from_json, entry_to_json, read_run
 from tpm_design.runs.optimize import SearchPlan, search
+from tpm_design.runs.ranking import best_entry
 from tpm_design.runs.rounds import starting_entries, with_counterexamples
-from tpm_design.runs.search import Entry, best_entry
 from tpm_design.study import Study, load_study
 from tpm_design.study.actions import Run, evaluations_frame
 

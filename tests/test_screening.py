@@ -19,33 +19,22 @@ from numpy.typing import NDArray
 
 import tpm_design as tpm
 from tpm_design.cli.app import app
+from tpm_design.evaluation.cutoffs import is_worse
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.evaluation.goals import scaled_objective
+from tpm_design.evaluation.result import Cutoff, Evaluation
 from tpm_design.optimizers.base import BudgetSpent, ScreeningSearch
 from tpm_design.optimizers.watch import Watch
-from tpm_design.problem import (
-    Cutoff,
-    Design,
-    Evaluation,
-    Problem,
-    Sample,
-    evaluate,
-    is_worse,
-    scaled_objective,
-)
+from tpm_design.problem import Design, Problem, Sample
 from tpm_design.report.history import history
+from tpm_design.runs.entry import Answers, Entry, design_key
 from tpm_design.runs.folder import RunWriter, entry_from_json, entry_to_json, read_run
+from tpm_design.runs.log import EvaluationLog
 from tpm_design.runs.optimize import view_of
+from tpm_design.runs.ranking import best_entry, cutoff_at
 from tpm_design.runs.replay import answers_in, left_over
-from tpm_design.runs.search import (
-    SCREENED,
-    Answers,
-    Entry,
-    EvaluationLog,
-    UnitSearch,
-    best_entry,
-    cutoff_at,
-    design_key,
-)
 from tpm_design.runs.tables import EvaluationTable, csv_line
+from tpm_design.runs.unit_search import SCREENED, UnitSearch
 from tpm_design.study.plain import dump_yaml
 from tpm_design.study.study import Study
 

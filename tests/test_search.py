@@ -11,10 +11,13 @@ import pytest
 
 from tpm_design.design_space import DesignSpace, octant_signs
 from tpm_design.errors import RefusedError
+from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.optimizers.base import BudgetSpent
-from tpm_design.problem import Accuracy, Problem, Variable, evaluate
+from tpm_design.problem import Accuracy, Problem, Variable
+from tpm_design.runs.entry import Entry
+from tpm_design.runs.log import EvaluationLog
 from tpm_design.runs.optimize import SearchPlan, SearchResult, search
-from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch
+from tpm_design.runs.unit_search import UnitSearch
 from tpm_design.study import load_study
 
 STUDIES = Path(__file__).parents[1] / "studies"

@@ -24,6 +24,7 @@ from tpm_design.design_space import (
     with_changes,
 )
 from tpm_design.errors import StudyError
+from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.problem import Problem, Variable
 from tpm_design.report.readings import at_end
 from tpm_design.report.words import range_text
@@ -208,7 +209,7 @@ def test_ranges_are_told_as_they_are_searched(study: Study) -> None:
     assert told == ["0.2 … 1 × f", "0.1 … 0.9 × db, log scale", "10 … 1000 mm, log scale", "equals db"]
     space = space_of(study.problem)
     for share, ends in ((0.0, ["db", "dp", "f"]), (0.5, []), (1.0, ["db", "dp", "f"])):
-        evaluation = tpm.problem.evaluate(study.problem, space.design(np.full(4, share)))
+        evaluation = evaluate(study.problem, space.design(np.full(4, share)))
         assert [variable.name for variable in at_end(study.problem, evaluation)] == ends
 
 

@@ -11,14 +11,17 @@ import numpy as np
 import pytest
 
 import tpm_design as tpm
+from tpm_design.evaluation.result import Evaluation
 from tpm_design.metrics.base import Measurement
 from tpm_design.metrics.context import Context
 from tpm_design.optimizers.base import Slopes
 from tpm_design.optimizers.watch import Watch
-from tpm_design.problem import Evaluation, Problem, Sample
+from tpm_design.problem import Problem, Sample
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import entry_from_json, entry_to_json
+from tpm_design.runs.log import EvaluationLog
 from tpm_design.runs.optimize import SearchPlan, search, view_of
-from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch
+from tpm_design.runs.unit_search import UnitSearch
 
 STUDY = """\
 version: 1

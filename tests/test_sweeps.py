@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 
 from tpm_design.errors import UsageError
+from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.metrics import METRICS
 from tpm_design.metrics.base import Measurement
 from tpm_design.metrics.context import Context
-from tpm_design.problem import Goal, Problem, evaluate
+from tpm_design.problem import Goal, Problem
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import entry_to_json
-from tpm_design.runs.search import Entry
 from tpm_design.runs.sweeps import REPEATED_EVERY, Failure, Shard, SweepResult, failures, sweep
 from tpm_design.study import Study, load_study
 from tpm_design.study.sweep_points import held_values, plan_size, sweep_points

@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.problem import CENTRE, Design, Problem, Variable, with_ties
+from tpm_design.problem import CENTRE, Design, Problem, Variable
 
 FloatArray = NDArray[np.float64]
 
@@ -179,6 +179,11 @@ def octant_signs(modes: Mapping[str, Mapping[str, str]]) -> dict[str, tuple[floa
         x, y, z = (meaning[sign] for sign in text) if text != "any" else (0.0, 0.0, 0.0)
         signs[label] = (x, y, z)
     return signs
+
+
+def with_ties(ties: Mapping[str, str], design: Design) -> Design:
+    """The design with every tied parameter at the value of the one it names."""
+    return {**design, **{name: design[source] for name, source in ties.items()}}
 
 
 def with_ratios(variables: Sequence[Variable], multiples: Mapping[str, float], design: Design) -> Design:

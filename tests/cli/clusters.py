@@ -13,7 +13,9 @@ from pathlib import Path
 
 import psutil
 
-from tpm_design.problem import Evaluation, Problem, evaluate
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.problem import Problem
 
 
 def environment(problem: Problem, name: str) -> str | None:

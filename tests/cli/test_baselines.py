@@ -15,7 +15,7 @@ from command_line import STUDY, Outcome, tpm_design, written
 
 import tpm_design as tpm
 from small_studies import CERTIFIED
-from tpm_design.problem import evaluate
+from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.runs.folder import read_run
 from tpm_design.runs.tables import csv_line, designs_table
 

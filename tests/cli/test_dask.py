@@ -26,11 +26,12 @@ from test_sweep import OWN_FILE
 import tpm_design as tpm
 from small_studies import CERTIFIED
 from tpm_design.errors import RunStoppedError
-from tpm_design.problem import Design, evaluate
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.problem import Design
 from tpm_design.runs import dask_workers
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.executors import in_order
 from tpm_design.runs.folder import entry_to_json, read_run
-from tpm_design.runs.search import Entry
 from tpm_design.study.sweep_points import sweep_points
 
 GRID = (

@@ -19,10 +19,11 @@ from tpm_design.problem import Problem
 from tpm_design.report.convergence import convergence_figure
 from tpm_design.report.front_figures import front_figure
 from tpm_design.report.reported import read_reported
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import entry_to_json, read_run
 from tpm_design.runs.front import extremes, knee, non_dominated
 from tpm_design.runs.optimize import SearchPlan, search
-from tpm_design.runs.search import Entry, scaled_objectives
+from tpm_design.runs.ranking import scaled_objectives
 from tpm_design.study import Study
 
 FRONT = """\

@@ -16,9 +16,10 @@ from command_line import STUDY, Outcome, command, tpm_design, written
 
 import tpm_design as tpm
 from tpm_design.errors import UsageError
-from tpm_design.problem import evaluate
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import entry_to_json, read_run
-from tpm_design.runs.search import Entry, best_entry
+from tpm_design.runs.ranking import best_entry
 from tpm_design.study.actions import optimize_study
 
 FILES = {"study.yaml", "evaluations.csv", "evaluations.jsonl", "designs.csv", "run.json"}

@@ -10,11 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tpm_design.evaluation.contexts import design_context
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.evaluation.slopes import Neighbour
 from tpm_design.mechanisms import MECHANISMS
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.metrics import METRICS
 from tpm_design.metrics.base import UNDEFINED, Metric
-from tpm_design.problem import Design, Evaluation, Goal, Neighbour, Problem, design_context, evaluate
+from tpm_design.problem import Design, Goal, Problem
 from tpm_design.units import Units, unit_for
 from tpm_design.workspace.regions import Box, Tilt
 

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 import tpm_design as tpm
 from tpm_design.certificates.verdict import verdict
 from tpm_design.errors import ParameterError
+from tpm_design.evaluation.contexts import design_context
+from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.mechanisms import MECHANISMS
 from tpm_design.mechanisms.fold_lines import FoldLine
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.metrics import METRICS
-from tpm_design.problem import Goal, Problem, design_context, evaluate
+from tpm_design.problem import Goal, Problem
 from tpm_design.workspace.fold_clearance import fold_clearance
 from tpm_design.workspace.region_geometry import place, signed_distance_at
 from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Points, Shape, Sphere

@@ -11,10 +11,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.evaluation.goals import slack_pieces
+from tpm_design.evaluation.result import Evaluation
 from tpm_design.mechanisms.uru import KIND
 from tpm_design.metrics import METRICS
 from tpm_design.metrics.base import Measurement
-from tpm_design.problem import Accuracy, Evaluation, Goal, Problem, evaluate, slack_pieces
+from tpm_design.problem import Accuracy, Goal, Problem
 from tpm_design.workspace.regions import Box, Cylinder, Ellipsoid, Shape, Sphere
 
 MODES = {"+++ +++": {"octant": "+++", "elbows": "+++"}, "+++ +-+": {"octant": "+++", "elbows": "+-+"}}

@@ -11,9 +11,10 @@ from tpm_design.baselines.deviations import Deviations, compare_tables
 from tpm_design.baselines.folders import read_result
 from tpm_design.baselines.tables import ResultTable, Row, metric_of_error, parse_table, read_table
 from tpm_design.errors import UsageError
-from tpm_design.problem import Design, Problem, Sample, evaluate
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.problem import Design, Problem, Sample
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import DESIGNS, LOG, STUDY, SUMMARY, read_run
-from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import designs_table, metric_columns, parameter_columns
 from tpm_design.study import Study, load_study
 from tpm_design.units import Units

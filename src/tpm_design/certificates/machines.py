@@ -10,10 +10,11 @@ import numpy as np
 
 from tpm_design.certificates.demands import Demand
 from tpm_design.errors import ParameterError
+from tpm_design.evaluation.contexts import offset_mechanism
 from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.metrics.context import Context
-from tpm_design.problem import Problem, offset_mechanism
+from tpm_design.problem import Problem
 from tpm_design.workspace.indices import index_values
 
 Parameters = Mapping[str, tuple[float, ...]]

@@ -11,11 +11,12 @@ from tpm_design.arithmetic.rounding import check_rounding
 from tpm_design.certificates.demands import REACH, Demand, NoProofError, demands, refutable
 from tpm_design.certificates.settlement import Breaking, Outcome, Settlement, settle
 from tpm_design.errors import ParameterError
+from tpm_design.evaluation.contexts import design_context
 from tpm_design.mechanisms.base import within
 from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.metrics.context import Context
-from tpm_design.problem import Design, Goal, Problem, design_context
+from tpm_design.problem import Design, Goal, Problem
 from tpm_design.worker_threads import WorkerThreads
 
 Box = tuple[tuple[float, float], ...]

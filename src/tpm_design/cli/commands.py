@@ -20,14 +20,15 @@ from tpm_design.cli.results import design_rows, evaluation_data, limit_text, res
 from tpm_design.cli.text import table
 from tpm_design.design_space import with_changes
 from tpm_design.errors import UsageError
+from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.mechanisms import mechanism_kind
-from tpm_design.problem import Design, evaluate
+from tpm_design.problem import Design
 from tpm_design.report.words import gap_text, pose_text, pose_unit_names
 from tpm_design.runs.executors import SWITCH_INTERVAL, Executor
 from tpm_design.runs.folder import STUDY, newest_run, read_run
 from tpm_design.runs.optimality import gap_of
 from tpm_design.runs.optimize import check_plan
-from tpm_design.runs.search import best_entry
+from tpm_design.runs.ranking import best_entry
 from tpm_design.study import (
     Study,
     choose_design,

@@ -8,8 +8,8 @@ from typing import Any
 from tpm_design.cli.results import evaluation_data
 from tpm_design.cli.text import table
 from tpm_design.problem import Problem
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.marks import front_marks
-from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import goal_unit, parameter_columns
 from tpm_design.units import Units
 

@@ -16,7 +16,8 @@ from tpm_design.cli.guard import NOT_PROVED, NOTHING_FEASIBLE, complain
 from tpm_design.cli.results import design_rows, error_text
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
-from tpm_design.problem import CENTRE, Design, Problem, design_context
+from tpm_design.evaluation.contexts import design_context
+from tpm_design.problem import CENTRE, Design, Problem
 from tpm_design.report.words import lengths_text
 from tpm_design.study import Study
 from tpm_design.study.inscribed import region_of, study_of

@@ -10,8 +10,9 @@ from contextlib import contextmanager
 import numpy as np
 
 from tpm_design.problem import Problem
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.front import extended
-from tpm_design.runs.search import Entry, minimised, scaled_objectives
+from tpm_design.runs.ranking import minimised, scaled_objectives
 from tpm_design.runs.tables import goal_unit
 from tpm_design.units import Units
 

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from tpm_design.cli.text import table
-from tpm_design.problem import Design, Evaluation, Goal, Problem
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.problem import Design, Goal, Problem
 from tpm_design.report.readings import at_end, limiting, nearest_constraint
 from tpm_design.report.words import asked, range_text
-from tpm_design.runs.search import Entry
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.tables import goal_unit, parameter_columns
 from tpm_design.units import Units
 

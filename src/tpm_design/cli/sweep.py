@@ -17,8 +17,8 @@ from tpm_design.cli.results import NO_VALUE, evaluation_data
 from tpm_design.cli.text import table
 from tpm_design.errors import UsageError
 from tpm_design.problem import Goal
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import STUDY, TABLE
-from tpm_design.runs.search import Entry
 from tpm_design.runs.sweeps import WHOLE, Shard, failures
 from tpm_design.runs.tables import goal_unit
 from tpm_design.study import Study, load_study

@@ -23,9 +23,10 @@ from tpm_design.report.style import (
     title,
     wrapped,
 )
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.front import FloatArray, FrontBox, extended, front_box
 from tpm_design.runs.marks import KNEE, front_marks
-from tpm_design.runs.search import Entry, scaled_objectives
+from tpm_design.runs.ranking import scaled_objectives
 from tpm_design.runs.tables import goal_unit
 
 MOST_PANELS = 6

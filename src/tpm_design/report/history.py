@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.problem import Problem
-from tpm_design.runs.search import Entry
+from tpm_design.runs.entry import Entry
 
 FloatArray = NDArray[np.float64]
 

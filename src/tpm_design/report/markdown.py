@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from tpm_design.certificates.document import FILE as CERTIFICATE
-from tpm_design.problem import Evaluation, Goal
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.problem import Goal
 from tpm_design.report.certified import certificate_lines
 from tpm_design.report.escape import code, code_cell, table, text
 from tpm_design.report.figures import DRAWING, FIGURES, Picture
@@ -24,8 +25,8 @@ from tpm_design.report.words import (
     range_text,
     shape_text,
 )
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import DESIGNS, LOG, STUDY, SUMMARY, TABLE
-from tpm_design.runs.search import Entry
 from tpm_design.runs.tables import goal_unit, parameter_columns
 
 NONE = "–"

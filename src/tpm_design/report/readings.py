@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass
 
 from tpm_design.design_space import coordinate_of
-from tpm_design.problem import Evaluation, Goal, Problem, Variable
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.problem import Goal, Problem, Variable
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.optimize import binding
-from tpm_design.runs.search import Entry
 
 AT_BOUND = 0.01
 """A constraint limits a design where its slack is within this share of its metric's scale."""

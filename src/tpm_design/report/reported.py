@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tpm_design.errors import ParameterError
+from tpm_design.evaluation.contexts import design_context
 from tpm_design.metrics.context import Context
-from tpm_design.problem import Problem, design_context
+from tpm_design.problem import Problem
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import STUDY, StoredRun, read_run
-from tpm_design.runs.search import Entry, best_entry, front_entries
+from tpm_design.runs.ranking import best_entry, front_entries
 from tpm_design.study import Study, load_study
 from tpm_design.study.sweep_points import sweep_points
 

@@ -16,9 +16,10 @@ from types import MappingProxyType
 from typing import Any
 
 from tpm_design.errors import UsageError
-from tpm_design.problem import Cutoff, Evaluation, Problem
+from tpm_design.evaluation.result import Cutoff, Evaluation
+from tpm_design.problem import Problem
 from tpm_design.runs.durable import AppendedLines, replace_file
-from tpm_design.runs.search import Entry
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.tables import EvaluationTable, csv_line, designs_table
 from tpm_design.units import Units
 

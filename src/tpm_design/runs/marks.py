@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from tpm_design.problem import Problem
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.front import extremes, knee
-from tpm_design.runs.search import Entry, scaled_objectives
+from tpm_design.runs.ranking import scaled_objectives
 
 KNEE = "knee"
 

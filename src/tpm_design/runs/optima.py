@@ -9,7 +9,8 @@ import numpy as np
 from tpm_design.design_space import DesignSpace
 from tpm_design.optimizers.starts import are_one
 from tpm_design.problem import Design, Problem
-from tpm_design.runs.search import Entry, design_key, rank
+from tpm_design.runs.entry import Entry, design_key
+from tpm_design.runs.ranking import rank
 
 
 def distinct_optima(

@@ -13,10 +13,13 @@ from tpm_design.errors import RefusedError
 from tpm_design.optimizers import check_pair, optimizer
 from tpm_design.optimizers.base import BudgetSpent, Optimizer, Stalled
 from tpm_design.problem import Goal, Problem, Sample
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.executors import Executor
+from tpm_design.runs.log import EvaluationLog
 from tpm_design.runs.optima import distinct_optima
+from tpm_design.runs.ranking import best_entry, front_entries
 from tpm_design.runs.replay import answers_in, left_over
-from tpm_design.runs.search import Entry, EvaluationLog, UnitSearch, best_entry, front_entries
+from tpm_design.runs.unit_search import UnitSearch
 from tpm_design.synthesis.bound import ReachBound
 from tpm_design.synthesis.relaxation import checked_relaxation
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from tpm_design.runs.search import Answers, Entry, answer_key
+from tpm_design.runs.entry import Answers, Entry, answer_key
 
 
 def answers_in(entries: Iterable[Entry]) -> Answers:

@@ -14,7 +14,9 @@ from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.optimizers import optimizer
 from tpm_design.optimizers.base import BudgetSpent
 from tpm_design.problem import Design, Goal, Problem, Sample
+from tpm_design.runs.entry import Answers, Entry
 from tpm_design.runs.executors import Executor
+from tpm_design.runs.log import EvaluationLog
 from tpm_design.runs.optima import distinct_optima
 from tpm_design.runs.optimize import (
     Round,
@@ -30,8 +32,8 @@ from tpm_design.runs.optimize import (
     status_sentence,
     view_of,
 )
+from tpm_design.runs.ranking import best_entry, rank
 from tpm_design.runs.replay import answers_in, left_over
-from tpm_design.runs.search import Answers, Entry, EvaluationLog, best_entry, rank
 from tpm_design.workspace.region_geometry import nearest_pose
 
 FIRST_SHARE = 0.8

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from tpm_design.errors import UsageError
-from tpm_design.problem import Design, Evaluation, Problem, evaluate
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.problem import Design, Problem
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.executors import Executor, Threads
 from tpm_design.runs.folder import entry_to_json
-from tpm_design.runs.search import Entry
 from tpm_design.runs.shipping import portable
 
 REPEATED_EVERY = 19

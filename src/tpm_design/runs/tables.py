@@ -8,10 +8,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tpm_design.evaluation.result import Evaluation
 from tpm_design.mechanisms.base import MechanismKind
-from tpm_design.problem import Evaluation, Goal, Problem
+from tpm_design.problem import Goal, Problem
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.marks import front_marks
-from tpm_design.runs.search import Entry
 from tpm_design.units import Units, si_unit, unit_for
 
 

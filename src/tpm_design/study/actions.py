@@ -14,7 +14,10 @@ from tpm_design.certificates.document import FILE as CERTIFICATE
 from tpm_design.certificates.document import document, write_document
 from tpm_design.certificates.verdict import Verdict
 from tpm_design.errors import UsageError, did_you_mean
-from tpm_design.problem import Design, Evaluation, evaluate
+from tpm_design.evaluation.evaluate import evaluate
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.problem import Design
+from tpm_design.runs.entry import Entry, answer_key
 from tpm_design.runs.executors import Executor
 from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run, text_hash
 from tpm_design.runs.lock import sole_writer
@@ -24,7 +27,6 @@ from tpm_design.runs.optimize import SearchPlan, SearchResult, check_plan, searc
 from tpm_design.runs.proved_knee import with_proved_knee
 from tpm_design.runs.replay import answers_in
 from tpm_design.runs.rounds import Proving, search_certified
-from tpm_design.runs.search import Entry, answer_key
 from tpm_design.runs.tables import EvaluationTable, csv_line
 from tpm_design.study.design import completed_design, tied_error
 from tpm_design.study.plain import dump_yaml
@@ -240,7 +242,7 @@ def pose_values(study: Study, design: Design, pose: tuple[float, float, float]) 
     """Joint values, Jacobian and margins at one pose as users write it, SI; None where there is none."""
     import numpy as np
 
-    from tpm_design.problem import design_context
+    from tpm_design.evaluation.contexts import design_context
 
     context = design_context(study.problem, design)
     mechanism, mode = context.mechanism, context.mode

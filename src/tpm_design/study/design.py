@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from tpm_design.design_space import first_value, with_ratios
+from tpm_design.design_space import first_value, with_ratios, with_ties
 from tpm_design.errors import UsageError, did_you_mean
-from tpm_design.problem import Design, Problem, Variable, with_ties
+from tpm_design.problem import Design, Problem, Variable
 from tpm_design.study.document import number
 from tpm_design.study.study import Study
 from tpm_design.study.sweep import design_names, design_value

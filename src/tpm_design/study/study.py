@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpm_design.errors import UsageError
-from tpm_design.problem import Evaluation, Problem
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.problem import Problem
 from tpm_design.study.plug_in import PlugIn
 from tpm_design.study.sweep import Sweep
 from tpm_design.units import Units

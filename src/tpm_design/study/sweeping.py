@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tpm_design.errors import UsageError
+from tpm_design.runs.entry import Entry
 from tpm_design.runs.executors import Executor
 from tpm_design.runs.folder import (
     STUDY,
@@ -24,7 +25,7 @@ from tpm_design.runs.folder import (
     text_hash,
 )
 from tpm_design.runs.lock import sole_writer
-from tpm_design.runs.search import Entry, best_entry
+from tpm_design.runs.ranking import best_entry
 from tpm_design.runs.sweeps import WHOLE, Point, Shard, SweepResult, sweep
 from tpm_design.study.plain import dump_yaml
 from tpm_design.study.resolve import load_study

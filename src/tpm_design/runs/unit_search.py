@@ -1,0 +1,146 @@
+"""The problem as an optimiser sees it: the unit cube, up to a number of evaluations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tpm_design.design_space import DesignSpace, value_at
+from tpm_design.evaluation.result import Evaluation
+from tpm_design.evaluation.slopes import Neighbour, Neighbours
+from tpm_design.optimizers.base import Outcomes
+from tpm_design.runs.entry import Entry
+from tpm_design.runs.log import EvaluationLog
+from tpm_design.runs.outcomes import outcomes, slopes_of
+from tpm_design.runs.ranking import cutoff_at
+from tpm_design.synthesis.bound import relaxed_designs
+
+FloatArray = NDArray[np.float64]
+
+SCREENED = 32
+"""Points that are screened by one cutoff: fixed, so that the log does not depend on the number of workers."""
+
+SLOPE_STEP = 1e-7
+"""Share of each range that slopes are differences over: of smooth functions, so that it may be small."""
+
+
+@dataclass(frozen=True)
+class UnitSearch:
+    """A ``Search`` over a design space, up to ``limit`` entries in the log. ``sizes``: in how many smooth
+    pieces each constraint is given to the optimiser; ``objective_sizes``: each objective, empty for one."""
+
+    log: EvaluationLog
+    space: DesignSpace
+    start: FloatArray
+    limit: int
+    sizes: tuple[int, ...]
+    objective_sizes: tuple[int, ...] = ()
+
+    @property
+    def dimension(self) -> int:
+        return len(self.space.variables)
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        return self.space.levels
+
+    @property
+    def constraint_count(self) -> int:
+        return sum(self.sizes)
+
+    @property
+    def objective_count(self) -> int:
+        return len(self.log.problem.objectives)
+
+    def evaluate(self, points: FloatArray) -> Outcomes:
+        """Values at ``points`` (N, n). Raises BudgetSpent."""
+        table = np.atleast_2d(np.asarray(points, dtype=np.float64))
+        results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
+        return outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
+
+    def evaluate_sloped(self, points: FloatArray, sloped: NDArray[np.bool_]) -> Outcomes:
+        """As ``SlopedSearch``."""
+        table = np.atleast_2d(np.asarray(points, dtype=np.float64))
+        designs = [self.space.design(point) for point in table]
+        around = [
+            self._neighbours(point) if asked else None for point, asked in zip(table, sloped, strict=True)
+        ]
+        results = self.log.evaluations(designs, self.limit, neighbours=around)
+        found = outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
+        return replace(
+            found,
+            slopes=tuple(
+                slopes_of(self.log.problem, result, self.sizes, self._rates(point)) if asked else None
+                for point, result, asked in zip(table, results, sloped, strict=True)
+            ),
+        )
+
+    def _neighbours(self, point: FloatArray) -> Neighbours:
+        """One along each continuous variable."""
+        found = []
+        for number, step in enumerate(self._steps(point)):
+            if step:
+                moved = point.copy()
+                moved[number] += step
+                found.append(Neighbour(self.space.design(moved), self._change(number, point, step)))
+        return tuple(found)
+
+    def _steps(self, point: FloatArray) -> FloatArray:
+        """Those to the neighbours (n,): towards the middle of the cube, 0 along discrete variables."""
+        continuous = np.array([count == 0 for count in self.levels])
+        return np.where(continuous, np.where(point > 0.5, -SLOPE_STEP, SLOPE_STEP), 0.0)
+
+    def _change(self, number: int, point: FloatArray, step: float) -> float:
+        """Of a variable's value over a step of its coordinate."""
+        variable, coordinate = self.space.variables[number], float(point[number])
+        return float(value_at(variable, coordinate + step)) - float(value_at(variable, coordinate))
+
+    def _rates(self, point: FloatArray) -> FloatArray:
+        """By which values grow with their coordinates (n,): 0 along discrete variables."""
+        steps = self._steps(point)
+        return np.array(
+            [self._change(n, point, step) / step if step else 0.0 for n, step in enumerate(steps)]
+        )
+
+    def screen(self, points: FloatArray, keep: int) -> Outcomes:
+        """As ``ScreeningSearch``. The cutoff of each ``SCREENED`` points is the best ``keep``-th of those
+        before them."""
+        table = np.atleast_2d(np.asarray(points, dtype=np.float64))
+        designs = [self.space.design(point) for point in table]
+        results: list[Evaluation] = []
+        for first in range(0, len(designs), SCREENED):
+            cutoff = cutoff_at(self.log.problem, results, keep)
+            results += self.log.evaluations(designs[first : first + SCREENED], self.limit, cutoff)
+        return outcomes(self.log.problem, results, self.sizes)
+
+    def in_pieces(self) -> UnitSearch:
+        """The same search, each constraint and objective in as many smooth pieces as a design in the log
+        had."""
+        most, problem = self.log.most_pieces, self.log.problem
+        return replace(
+            self,
+            sizes=tuple(most.get(goal.label, 1) for goal in problem.constraints),
+            objective_sizes=tuple(most.get(goal.label, 1) for goal in problem.objectives),
+        )
+
+    def note_optima(self, points: FloatArray) -> None:
+        """The local optima (N, n) that the method knows by now."""
+        self.log.optima = tuple(self.space.design(point) for point in points)
+
+    def relaxed_optima(self) -> FloatArray:
+        """Points (N, n) of the convex relaxation's designs, see ``synthesis``. Raises RefusedError where the
+        solver fails."""
+        # one more than can be evaluated: so what is left out ends as a spent budget
+        designs = relaxed_designs(self.log.problem, self.space.design(self.start), self.limit + 1)
+        points = [self.space.point(design) for design in designs]
+        return np.array(points, dtype=np.float64).reshape(-1, self.dimension)
+
+    def continuous_near(self, entry: Entry, share: float, limit: int) -> UnitSearch:
+        """The search of the continuous variables alone, within ``share`` of their ranges around a design
+        already evaluated; its constraints in pieces."""
+        evaluation = entry.evaluation
+        space = self.space.holding_discrete(evaluation.design).near(evaluation.design, share)
+        sizes = tuple(len(evaluation.pieces.get(goal.label, (0.0,))) for goal in self.log.problem.constraints)
+        return replace(self, space=space, start=space.point(evaluation.design), limit=limit, sizes=sizes)
