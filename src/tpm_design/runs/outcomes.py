@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tpm_design.evaluation.result import Evaluation
-from tpm_design.optimizers.base import Outcomes, Slopes
+from tpm_design.optimizers.base import FloatArray, Outcomes, Slopes
 from tpm_design.problem import Goal, Problem
 from tpm_design.runs.ranking import FAILED, minimised_value, scaled_objectives
 
