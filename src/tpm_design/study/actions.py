@@ -77,16 +77,16 @@ def plan_of(study: Study) -> SearchPlan:
 def optimize_study(
     study: Study,
     *,
-    workers: int,
+    executor: Executor,
+    proof_workers: int,
     output: Path | None,
     watch: Callable[[Entry], None] = lambda entry: None,
     resume: Path | None = None,
-    executor: Executor | None = None,
 ) -> Run:
     """Search the study's design space; with ``output`` the run is written below it as it happens.
 
     ``watch`` sees each evaluation. ``resume``: a run folder to go on in instead of a new one.
-    ``executor``: who evaluates, ``workers`` threads if None; these prove in any case. Raises
+    ``executor``: who evaluates; ``proof_workers`` threads of this process prove. Raises
     RefusedError or UsageError before anything runs, RunStoppedError where the run cannot be written.
     """
     plan = plan_of(study)
@@ -97,7 +97,7 @@ def optimize_study(
     if folder is None and output is not None:
         folder = create_run_folder(output, study.name, study.study_hash)
     if folder is None:
-        result = _searched(study, plan, workers, executor, watch, ())
+        result = _searched(study, plan, executor, proof_workers, watch, ())
     else:
         with sole_writer(folder):
             stored = None
@@ -105,7 +105,7 @@ def optimize_study(
                 # only now can nobody else write to it
                 check_resumable(study, folder)
                 stored = read_run(folder).entries
-            result = _written(study, plan, workers, executor, watch, folder, stored)
+            result = _written(study, plan, executor, proof_workers, watch, folder, stored)
     best = None if result.best is None else result.best.evaluation
     table = evaluations_frame(study, result.entries)
     front = tuple(entry.evaluation for entry in result.front)
@@ -115,31 +115,29 @@ def optimize_study(
 def _searched(
     study: Study,
     plan: SearchPlan,
-    workers: int,
-    executor: Executor | None,
+    executor: Executor,
+    proof_workers: int,
     record: Callable[[Entry], None],
     stored: Sequence[Entry],
 ) -> SearchResult:
     problem = study.problem
     if study.certification is None:
-        result = search(problem, plan, workers=workers, record=record, stored=stored, executor=executor)
+        result = search(problem, plan, executor=executor, record=record, stored=stored)
         return with_bound(problem, plan, result)
-    proving = Proving(study.certification.tolerance, study.certification.boxes)
+    proving = Proving(study.certification.tolerance, study.certification.boxes, proof_workers)
     if len(problem.objectives) > 1:
-        result = search(problem, plan, workers=workers, record=record, stored=stored, executor=executor)
-        result = with_proved_knee(problem, proving, result, workers=workers)
+        result = search(problem, plan, executor=executor, record=record, stored=stored)
+        result = with_proved_knee(problem, proving, result)
     else:
-        result = search_certified(
-            problem, plan, proving, workers=workers, record=record, stored=stored, executor=executor
-        )
+        result = search_certified(problem, plan, proving, executor=executor, record=record, stored=stored)
     return with_bound(study.problem, plan, result)
 
 
 def _written(
     study: Study,
     plan: SearchPlan,
-    workers: int,
-    executor: Executor | None,
+    executor: Executor,
+    proof_workers: int,
     watch: Callable[[Entry], None],
     folder: Path,
     stored: tuple[Entry, ...] | None,
@@ -157,7 +155,7 @@ def _written(
                 writer.record(entry)
             watch(entry)
 
-        result = _searched(study, plan, workers, executor, record, stored or ())
+        result = _searched(study, plan, executor, proof_workers, record, stored or ())
         if result.verdict is not None:
             data = document(study.problem, study.resolved(), study.study_hash, result.verdict)
             write_document(folder / CERTIFICATE, data)
@@ -172,7 +170,7 @@ def _written(
             "polish": plan.polish,
             "seed": plan.seed,
             "budget": plan.budget,
-            "workers": workers if executor is None else executor.workers,
+            "workers": executor.workers,
             "remarks": list(result.remarks),
             **_front_data(study, result),
             **_bound_data(result),
