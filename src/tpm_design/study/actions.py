@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 from tpm_design.certificates.document import FILE as CERTIFICATE
 from tpm_design.certificates.document import document, write_document
 from tpm_design.certificates.verdict import Verdict
+from tpm_design.digests import text_sha256
 from tpm_design.errors import UsageError, did_you_mean
 from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.problem import Design
 from tpm_design.runs.entry import Entry, answer_key
 from tpm_design.runs.executors import Executor
-from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run, text_hash
+from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run
 from tpm_design.runs.lock import sole_writer
 from tpm_design.runs.marks import front_marks
 from tpm_design.runs.optimality import gap_of, with_bound
@@ -176,7 +177,7 @@ def _written(
             **_bound_data(result),
             **({} if study.certification is None else _rounds_data(result)),
             "study_hash": study.study_hash,
-            "study_file_hash": text_hash(study_text),
+            "study_file_hash": text_sha256(study_text),
             **provenance(),
             **({} if stored is None else {"resumed_after": len(stored)}),
             "seconds": round(time.perf_counter() - began, 3),

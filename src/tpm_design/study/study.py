@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from contextlib import closing
@@ -10,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tpm_design.digests import canonical_sha256
 from tpm_design.errors import UsageError
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.problem import Problem
@@ -67,8 +67,7 @@ class Study:
     @property
     def study_hash(self) -> str:
         """SHA-256 of the resolved study: equal for studies that ask the same, however they are written."""
-        canonical = json.dumps(self.resolved(), sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-        return hashlib.sha256(canonical.encode()).hexdigest()
+        return canonical_sha256(self.resolved())
 
     def evaluate(self, values: Mapping[str, float | str]) -> Evaluation:
         """Every metric of one design. ``values``: SI, by name; a free quantity that is not given takes its

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tpm_design.digests import text_sha256
 from tpm_design.errors import UsageError
 from tpm_design.runs.entry import Entry
 from tpm_design.runs.executors import Executor
@@ -22,7 +23,6 @@ from tpm_design.runs.folder import (
     create_run_folder,
     provenance,
     read_run,
-    text_hash,
 )
 from tpm_design.runs.lock import sole_writer
 from tpm_design.runs.ranking import best_entry
@@ -193,7 +193,7 @@ def _finish(
         "workers": workers,
         "merged": list(merged),
         "study_hash": study.study_hash,
-        "study_file_hash": text_hash(dump_yaml(study.resolved())),
+        "study_file_hash": text_sha256(dump_yaml(study.resolved())),
         **provenance(),
         **told,
         "seconds": round(seconds, 3),
