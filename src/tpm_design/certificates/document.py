@@ -17,7 +17,7 @@ from typing import Any
 from tpm_design.certificates.settlement import Settlement, breaking_data
 from tpm_design.certificates.verdict import Requirement, Verdict
 from tpm_design.digests import canonical_sha256
-from tpm_design.errors import UsageError
+from tpm_design.errors import UsageError, unwritable
 from tpm_design.problem import Problem
 from tpm_design.workspace.region_geometry import BOX, CYLINDER, POINTS, PlacedRegion
 
@@ -124,8 +124,6 @@ def write_document(path: Path, data: Mapping[str, Any]) -> None:
         part.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         os.replace(part, path)
     except OSError as error:
-        raise UsageError(
-            f"The certificate cannot be written: {error.strerror}.",
-            where=str(path),
-            remedy="Choose another place with --output.",
+        raise unwritable(
+            "The certificate cannot be written", error, path, "Choose another place with --output."
         ) from None

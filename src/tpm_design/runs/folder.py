@@ -14,7 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from tpm_design.errors import UsageError
+from tpm_design.errors import UsageError, unwritable
 from tpm_design.evaluation.result import Cutoff, Evaluation
 from tpm_design.problem import Problem
 from tpm_design.runs.durable import AppendedLines, replace_file
@@ -47,10 +47,8 @@ def create_run_folder(results: Path, study_name: str, study_hash: str) -> Path:
         except FileExistsError:
             continue
         except OSError as error:
-            raise UsageError(
-                f"The run folder cannot be made: {error.strerror}.",
-                where=str(parent),
-                remedy="Choose another folder with --output.",
+            raise unwritable(
+                "The run folder cannot be made", error, parent, "Choose another folder with --output."
             ) from None
         return folder
     raise UsageError("Too many runs began in this second.", where=str(parent), remedy="Try again.")
