@@ -27,6 +27,7 @@ from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.optimizers import OPTIMIZERS, default_method
 from tpm_design.problem import Problem
+from tpm_design.runs.executors import Threads
 from tpm_design.runs.optimize import SearchPlan, search
 from tpm_design.runs.outcomes import outcomes
 from tpm_design.runs.ranking import minimised
@@ -53,7 +54,9 @@ class Outcome:
 def ours(problem: Problem, method: str, polish: str | None, budget: int, seed: int) -> Sequence[Evaluation]:
     """One search by a method of the package."""
     plan = SearchPlan(method, budget, seed, polish)
-    return [e.evaluation for e in search(problem, plan, workers=1, record=lambda entry: None).entries]
+    return [
+        e.evaluation for e in search(problem, plan, executor=Threads(1), record=lambda entry: None).entries
+    ]
 
 
 def by_default(problem: Problem, budget: int, seed: int) -> Sequence[Evaluation]:

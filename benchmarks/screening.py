@@ -8,6 +8,7 @@ from scipy.stats import qmc
 
 from row import Row, interleaved, seconds
 from tpm_design.problem import Problem
+from tpm_design.runs.executors import Threads
 from tpm_design.runs.log import EvaluationLog
 from tpm_design.runs.optimize import view_of
 from tpm_design.runs.unit_search import UnitSearch
@@ -28,7 +29,7 @@ ROUNDS = 5
 
 def fresh(problem: Problem) -> UnitSearch:
     """A search that has evaluated nothing."""
-    return view_of(EvaluationLog(problem, workers=1), POINTS)
+    return view_of(EvaluationLog(problem, executor=Threads(1)), POINTS)
 
 
 def rows() -> list[Row]:

@@ -47,14 +47,14 @@ def slow_points() -> tuple[Problem, list[Point]]:
     points = sweep_points(near)
     # the first sweep compiles
     for _ in range(2):
-        entries = sweep(near.problem, points, workers=1, record=lambda entry: None).entries
+        entries = sweep(near.problem, points, executor=Threads(1), record=lambda entry: None).entries
     slow = [entry for entry in entries if 1e3 * entry.evaluation.seconds >= LEAST_MILLISECONDS]
     return near.problem, [points[entry.number] for entry in slow[:POINTS]]
 
 
 def swept(problem: Problem, points: Sequence[Point], executor: Executor) -> int:
     """The sweep without its files."""
-    found = sweep(problem, points, workers=executor.workers, record=lambda entry: None, executor=executor)
+    found = sweep(problem, points, executor=executor, record=lambda entry: None)
     return len(found.entries) + found.repeated
 
 
@@ -65,7 +65,7 @@ def searched(study: Study, plan: SearchPlan, executor: Executor) -> int:
         tempfile.TemporaryDirectory() as folder,
         closing(RunWriter(Path(folder), problem, study.units, "")) as writer,
     ):
-        found = search(problem, plan, workers=executor.workers, record=writer.record, executor=executor)
+        found = search(problem, plan, executor=executor, record=writer.record)
     return len(found.entries)
 
 

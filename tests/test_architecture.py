@@ -24,6 +24,7 @@ MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__
 ROOMS = (
     "errors",
     "units",
+    "digests",
     "worker_threads",
     "checker",
     "arithmetic",
@@ -48,6 +49,7 @@ ROOMS = (
 ONLY = {
     "errors": set(),
     "units": set(),
+    "digests": set(),
     "worker_threads": set(),
     "checker": {"errors", "worker_threads"},
     "arithmetic": {"errors"},

@@ -25,6 +25,7 @@ from tpm_design.optimizers.places import looked_at
 from tpm_design.optimizers.quadratic import Program, elastic_step
 from tpm_design.optimizers.starts import SAME
 from tpm_design.runs.entry import Entry
+from tpm_design.runs.executors import Threads
 from tpm_design.runs.folder import entry_to_json, read_run
 from tpm_design.runs.optima import distinct_optima
 from tpm_design.runs.optimize import SearchPlan, search, space_of
@@ -372,7 +373,7 @@ def test_duplicates_are_merged(whole: Path, numbers: list[int], shift: float) ->
 def test_other_methods_leave_their_best_design_alone(study: Path) -> None:
     problem = load_study(study).problem
     plan = SearchPlan("scipy.differential_evolution", 60, 1, None)
-    result = search(problem, plan, workers=1, record=lambda entry: None)
+    result = search(problem, plan, executor=Threads(1), record=lambda entry: None)
     assert result.optima == (result.best,)
 
 

@@ -20,6 +20,7 @@ from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.problem import Problem, Sample
 from tpm_design.report import write_report
 from tpm_design.runs.entry import Entry
+from tpm_design.runs.executors import Threads
 from tpm_design.runs.folder import entry_from_json, entry_to_json, read_run
 from tpm_design.runs.optimize import SearchPlan, search
 from tpm_design.runs.ranking import best_entry
@@ -241,7 +242,7 @@ def test_a_study_that_asks_for_no_proof_is_searched_as_ever(study: Study, tmp_pa
     alone = search(
         plain.problem,
         SearchPlan("scipy.differential_evolution", 120, 1, "nlopt.cobyla"),
-        workers=1,
+        executor=Threads(1),
         record=lambda entry: None,
     )
     assert run.folder is not None

@@ -7,6 +7,7 @@ import io
 import math
 import shutil
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from tpm_design.optimizers.watch import Watch
 from tpm_design.problem import Design, Problem, Sample
 from tpm_design.report.history import history
 from tpm_design.runs.entry import Answers, Entry, design_key
+from tpm_design.runs.executors import Executor, Threads
 from tpm_design.runs.folder import RunWriter, entry_from_json, entry_to_json, read_run
 from tpm_design.runs.log import EvaluationLog
 from tpm_design.runs.optimize import view_of
@@ -93,8 +95,10 @@ def points_of(count: int, dimension: int, seed: int) -> FloatArray:
     return np.random.default_rng(seed).random((count, dimension))
 
 
-def search_of(problem: Problem, *, workers: int = 1, answers: Answers | None = None) -> UnitSearch:
-    log = EvaluationLog(problem, workers=workers, answers=answers or {})
+def search_of(
+    problem: Problem, *, executor: Executor | None = None, answers: Answers | None = None
+) -> UnitSearch:
+    log = EvaluationLog(problem, executor=executor or Threads(1), answers=answers or {})
     return view_of(log, 10_000)
 
 
@@ -221,9 +225,9 @@ def test_a_screen_does_not_depend_on_the_number_of_workers(study: Study) -> None
     points = points_of(4 * SCREENED, len(study.problem.variables), 5)
     logs = []
     for workers in (1, 2, 3):
-        search = search_of(study.problem, workers=workers)
-        search.screen(points, 6)
-        search.log.close()
+        with closing(Threads(workers)) as threads:
+            search = search_of(study.problem, executor=threads)
+            search.screen(points, 6)
         logs.append([timeless(entry.evaluation) for entry in search.log.entries])
     assert logs[0] == logs[1] == logs[2]
     assert sum(entry["status"] == "'aborted'" for entry in logs[0]) > 2 * SCREENED

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.optimizers.base import BudgetSpent
 from tpm_design.problem import Accuracy, Problem, Variable
 from tpm_design.runs.entry import Entry
+from tpm_design.runs.executors import Threads
 from tpm_design.runs.log import EvaluationLog
 from tpm_design.runs.optimize import SearchPlan, SearchResult, search
 from tpm_design.runs.unit_search import UnitSearch
@@ -29,7 +31,8 @@ def cube() -> Problem:
 
 
 def run(problem: Problem, plan: SearchPlan, workers: int = 2) -> SearchResult:
-    return search(problem, plan, workers=workers, record=lambda entry: None)
+    with closing(Threads(workers)) as threads:
+        return search(problem, plan, executor=threads, record=lambda entry: None)
 
 
 @pytest.fixture(scope="module")
@@ -83,15 +86,16 @@ def test_an_interruption_of_the_replay_loses_nothing(cube: Problem) -> None:
         if entry.number == 30:
             raise KeyboardInterrupt
 
-    again = search(cube, plan, workers=1, record=interrupt, stored=stored[:50])
+    again = search(cube, plan, executor=Threads(1), record=interrupt, stored=stored[:50])
     assert again.ending == "interrupted"
     assert again.entries == stored[:50]
-    assert search(cube, plan, workers=1, record=lambda entry: None, stored=again.entries).best is not None
+    resumed = search(cube, plan, executor=Threads(1), record=lambda entry: None, stored=again.entries)
+    assert resumed.best is not None
 
 
 def test_repeated_designs_cost_nothing_and_the_budget_is_exact(cube: Problem) -> None:
     space = DesignSpace(cube.variables, cube.fixed, octant_signs(cube.modes))
-    log = EvaluationLog(cube, workers=1)
+    log = EvaluationLog(cube, executor=Threads(1))
     view = UnitSearch(log, space, space.start(), 3, (1,) * len(cube.constraints))
     points = np.random.default_rng(0).random((2, view.dimension))
     first = view.evaluate(points)
@@ -106,7 +110,7 @@ def test_repeated_designs_cost_nothing_and_the_budget_is_exact(cube: Problem) ->
 def test_optimisers_see_finite_numbers_everywhere(cube: Problem) -> None:
     space = DesignSpace(cube.variables, cube.fixed, octant_signs(cube.modes))
     sizes = (32, 8, 1, 1)
-    view = UnitSearch(EvaluationLog(cube, workers=1), space, space.start(), 100, sizes)
+    view = UnitSearch(EvaluationLog(cube, executor=Threads(1)), space, space.start(), 100, sizes)
     outcome = view.evaluate(np.random.default_rng(2).random((60, view.dimension)))
     assert outcome.constraints.shape == (60, sum(sizes))
     for values in (outcome.objective, outcome.constraints, outcome.merit):
@@ -255,7 +259,7 @@ def test_pieces_of_objectives_have_the_objective_as_their_greatest(cube: Problem
         accuracy=Accuracy(1e-3, 3),
     )
     space = DesignSpace(problem.variables, problem.fixed, octant_signs(problem.modes))
-    view = UnitSearch(EvaluationLog(problem, workers=1), space, space.start(), 100, (1,))
+    view = UnitSearch(EvaluationLog(problem, executor=Threads(1)), space, space.start(), 100, (1,))
     middle = dict.fromkeys(("center_x", "center_y", "center_z"), 0.155)
     serving = space.point({**problem.fixed, "db": 0.19, "f": 0.23, "r": 0.19, "k": 1.0, **middle})
     rng = np.random.default_rng(4)

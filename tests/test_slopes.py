@@ -18,6 +18,7 @@ from tpm_design.optimizers.base import Slopes
 from tpm_design.optimizers.watch import Watch
 from tpm_design.problem import Problem, Sample
 from tpm_design.runs.entry import Entry
+from tpm_design.runs.executors import Threads
 from tpm_design.runs.folder import entry_from_json, entry_to_json
 from tpm_design.runs.log import EvaluationLog
 from tpm_design.runs.optimize import SearchPlan, search, view_of
@@ -56,7 +57,7 @@ def problem(tmp_path_factory: pytest.TempPathFactory) -> Problem:
 
 
 def view(problem: Problem) -> UnitSearch:
-    log = EvaluationLog(problem, workers=1)
+    log = EvaluationLog(problem, executor=Threads(1))
     whole = view_of(log, 10_000)
     # pieces are known as soon as a design in the log has them
     whole.evaluate(np.vstack([whole.start, np.random.default_rng(0).random((8, whole.dimension))]))
@@ -208,14 +209,14 @@ class Counting:
 def test_a_replay_finds_its_slopes_in_the_log(problem: Problem) -> None:
     """Nothing is evaluated again, and a search that was cut short goes on as if it had not been."""
     plan = SearchPlan("multistart", 400, 1, None)
-    whole = search(problem, plan, workers=1, record=lambda entry: None).entries
+    whole = search(problem, plan, executor=Threads(1), record=lambda entry: None).entries
     stored = [entry_from_json(entry_to_json(entry)) for entry in whole]
     assert [timeless(e.evaluation) for e in stored] == [timeless(e.evaluation) for e in whole]
     assert sum(entry.evaluation.slopes is not None for entry in stored) > 20
     for kept in (len(stored), len(stored) // 2):
         counting = Counting()
         resumed = search(
-            problem, plan, workers=1, record=lambda entry: None, stored=stored[:kept], executor=counting
+            problem, plan, executor=counting, record=lambda entry: None, stored=stored[:kept]
         ).entries
         assert [timeless(e.evaluation) for e in resumed] == [timeless(e.evaluation) for e in whole]
         assert (counting.asked == 0) == (kept == len(stored))

@@ -6,6 +6,7 @@ import itertools
 import math
 import threading
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from tpm_design.metrics.base import Measurement
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Goal, Problem
 from tpm_design.runs.entry import Entry
+from tpm_design.runs.executors import Threads
 from tpm_design.runs.folder import entry_to_json
 from tpm_design.runs.sweeps import REPEATED_EVERY, Failure, Shard, SweepResult, failures, sweep
 from tpm_design.study import Study, load_study
@@ -140,7 +142,8 @@ def test_shards_that_cannot_be(index: int, count: int) -> None:
 
 def run(problem: Problem, study: Study, workers: int) -> tuple[SweepResult, list[Entry]]:
     recorded: list[Entry] = []
-    result = sweep(problem, sweep_points(study), workers=workers, record=recorded.append)
+    with closing(Threads(workers)) as threads:
+        result = sweep(problem, sweep_points(study), executor=threads, record=recorded.append)
     return result, recorded
 
 
@@ -212,7 +215,8 @@ def test_an_interruption_leaves_what_was_evaluated(workers: int, tmp_path: Path)
         if len(recorded) == 10:
             raise KeyboardInterrupt
 
-    result = sweep(study.problem, sweep_points(study), workers=workers, record=record)
+    with closing(Threads(workers)) as threads:
+        result = sweep(study.problem, sweep_points(study), executor=threads, record=record)
     assert result.ending == "interrupted"
     assert list(result.entries) == sorted(recorded, key=lambda entry: entry.number)
     assert (len(recorded), result.repeated) == (10, 0)

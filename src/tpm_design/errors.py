@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 
 
 class TpmDesignError(Exception):
@@ -55,6 +56,12 @@ class RunStoppedError(TpmDesignError):
 
 class RefusedError(TpmDesignError):
     """A request that cannot work, refused before anything runs."""
+
+
+def unwritable(what: str, error: OSError, path: Path, remedy: str | None = None) -> UsageError:
+    """What to tell where the system does not let a file or folder be made. ``what`` is a sentence without its
+    stop, such as "The table cannot be written"."""
+    return UsageError(f"{what}: {error.strerror or error}.", where=str(path), remedy=remedy)
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -11,6 +11,7 @@ from tpm_design.baselines.deviations import Tolerance, compare_tables
 from tpm_design.baselines.folders import check_same_question, read_result
 from tpm_design.baselines.reproduction import reproduce
 from tpm_design.baselines.tables import read_table
+from tpm_design.runs.executors import Threads
 from tpm_design.runs.folder import DESIGNS, TABLE
 from tpm_design.runs.sweeps import WHOLE
 from tpm_design.study import load_study
@@ -96,7 +97,7 @@ def test_every_number_of_the_sweep_is_the_closed_form() -> None:
 
 
 def test_the_present_program_gives_every_row_of_the_sweep(tmp_path: Path) -> None:
-    run = sweep_study(load_study(SWEEP / "study.yaml"), shard=WHOLE, workers=1, output=tmp_path)
+    run = sweep_study(load_study(SWEEP / "study.yaml"), shard=WHOLE, executor=Threads(1), output=tmp_path)
     assert run.folder is not None
     before, now = (read_table(folder / TABLE) for folder in (SWEEP, run.folder))
     assert compare_tables(before, now, Tolerance(1e-9, 1e-12).allowed).exceedances == ()

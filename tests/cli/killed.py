@@ -13,9 +13,11 @@ import random
 import signal
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import tpm_design as tpm
+from tpm_design.runs.executors import Threads
 from tpm_design.runs.sweeps import Shard
 from tpm_design.study import Study
 from tpm_design.study.resuming import run_to_resume
@@ -34,7 +36,8 @@ def carried_out(study: Study, results: Path, shard: Shard | None) -> None:
         study.optimize(output=results, resume=resume)
         return
     folder = None if resume is None else run_to_resume(study, resume, results, shard)
-    sweep_study(study, shard=shard, workers=2, output=results, resume=folder)
+    with closing(Threads(2)) as threads:
+        sweep_study(study, shard=shard, executor=threads, output=results, resume=folder)
 
 
 def killed(study: Study, results: Path, shard: Shard | None, chance: random.Random) -> bool:

@@ -20,6 +20,7 @@ from tpm_design.report.convergence import convergence_figure
 from tpm_design.report.front_figures import front_figure
 from tpm_design.report.reported import read_reported
 from tpm_design.runs.entry import Entry
+from tpm_design.runs.executors import Threads
 from tpm_design.runs.folder import entry_to_json, read_run
 from tpm_design.runs.front import extremes, knee, non_dominated
 from tpm_design.runs.optimize import SearchPlan, search
@@ -306,7 +307,7 @@ def not_longer(problem: Problem, entry: Entry, seed: int) -> float:
     )
     alone = replace(problem, objectives=(size,), constraints=(*problem.constraints, floor))
     plan = SearchPlan("scipy.differential_evolution", 240, seed, "nlopt.cobyla")
-    found = search(alone, plan, workers=1, record=lambda e: None, stored=()).best
+    found = search(alone, plan, executor=Threads(1), record=lambda e: None, stored=()).best
     assert found is not None
     assert found.evaluation.status == "feasible"
     mine, best = (e.evaluation.metrics["total_link_length"] for e in (entry, found))

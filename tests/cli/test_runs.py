@@ -20,7 +20,6 @@ from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import entry_to_json, read_run
 from tpm_design.runs.ranking import best_entry
-from tpm_design.study.actions import optimize_study
 
 FILES = {"study.yaml", "evaluations.csv", "evaluations.jsonl", "designs.csv", "run.json"}
 SECONDS = "seconds [s]"
@@ -291,7 +290,7 @@ def test_a_folder_that_cannot_be_made_is_one_message(tmp_path: Path) -> None:
 
 def test_two_searches_at_the_same_time_have_folders_of_their_own(tmp_path: Path) -> None:
     study = tpm.load_study(written(tmp_path)).searched_with(budget=2)
-    folders = {optimize_study(study, workers=1, output=tmp_path / "results").folder for _ in range(3)}
+    folders = {study.optimize(output=tmp_path / "results").folder for _ in range(3)}
     assert len(folders) == 3
 
 

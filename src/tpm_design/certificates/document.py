@@ -6,7 +6,6 @@ proof, and which statements each requirement needs. Lengths in metres, angles in
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import platform
@@ -17,7 +16,8 @@ from typing import Any
 
 from tpm_design.certificates.settlement import Settlement, breaking_data
 from tpm_design.certificates.verdict import Requirement, Verdict
-from tpm_design.errors import UsageError
+from tpm_design.digests import canonical_sha256
+from tpm_design.errors import UsageError, unwritable
 from tpm_design.problem import Problem
 from tpm_design.workspace.region_geometry import BOX, CYLINDER, POINTS, PlacedRegion
 
@@ -28,11 +28,6 @@ ASSUMPTIONS = (
     "axis directions are exact: the tolerances are on lengths and ratios, of each limb by itself, and "
     "misaligned axes are not covered",
 )
-
-
-def canonical(data: Any) -> bytes:
-    """The one way in which data are written to be hashed."""
-    return json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False).encode()
 
 
 def document(problem: Problem, study: Mapping[str, Any], study_hash: str, verdict: Verdict) -> dict[str, Any]:
@@ -62,7 +57,7 @@ def document(problem: Problem, study: Mapping[str, Any], study_hash: str, verdic
     }
     # what was computed must be what is read back
     data = dict(json.loads(json.dumps(data, ensure_ascii=False, allow_nan=False)))
-    return data | {"sha256": hashlib.sha256(canonical(data)).hexdigest()}
+    return data | {"sha256": canonical_sha256(data)}
 
 
 def region_data(region: PlacedRegion) -> dict[str, Any]:
@@ -129,8 +124,6 @@ def write_document(path: Path, data: Mapping[str, Any]) -> None:
         part.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         os.replace(part, path)
     except OSError as error:
-        raise UsageError(
-            f"The certificate cannot be written: {error.strerror}.",
-            where=str(path),
-            remedy="Choose another place with --output.",
+        raise unwritable(
+            "The certificate cannot be written", error, path, "Choose another place with --output."
         ) from None

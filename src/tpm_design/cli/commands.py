@@ -19,7 +19,7 @@ from tpm_design.cli.progress import search_progress
 from tpm_design.cli.results import design_rows, evaluation_data, limit_text, result_text
 from tpm_design.cli.text import table
 from tpm_design.design_space import with_changes
-from tpm_design.errors import UsageError
+from tpm_design.errors import UsageError, unwritable
 from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.mechanisms import mechanism_kind
 from tpm_design.problem import Design
@@ -55,7 +55,7 @@ def init_study(name: str, mechanism: str) -> int | None:
             "This file exists already.", where=str(path), remedy="Choose another name, or remove it."
         ) from None
     except OSError as error:
-        raise UsageError(f"This file cannot be written: {error.strerror}.", where=str(path)) from None
+        raise unwritable("This file cannot be written", error, path) from None
     print(f"Wrote {path}. Next: tpm-design optimize {path}")
     return None
 
@@ -242,7 +242,7 @@ def optimize_one(
         _check_search(study, folder)
         check_dask(dask, workers, [study])
         with evaluators(dask, threads) as executor:
-            run = _searched(study, threads, executor, output, folder, quiet=quiet or as_json)
+            run = _searched(study, executor, threads, output, folder, quiet=quiet or as_json)
         print(json.dumps(_run_data(study, run), ensure_ascii=False) if as_json else _run_text(study, run))
         return _ending(run)
     studies = {
@@ -258,7 +258,7 @@ def optimize_one(
             if not (quiet or as_json):
                 print(f"{label}: {study.problem.kind.title}", file=sys.stderr)
             folder = folders.get(label)
-            runs[label] = _searched(study, threads, executor, output, folder, quiet=quiet or as_json)
+            runs[label] = _searched(study, executor, threads, output, folder, quiet=quiet or as_json)
             if runs[label].result.ending == "interrupted":
                 break
     if as_json:
@@ -299,11 +299,16 @@ def _check_search(study: Study, resume: Path | None) -> None:
 
 
 def _searched(
-    study: Study, workers: int, executor: Executor | None, output: Path, resume: Path | None, *, quiet: bool
+    study: Study, executor: Executor, proof_workers: int, output: Path, resume: Path | None, *, quiet: bool
 ) -> Run:
     with search_progress(study.problem, study.units, study.optimizer.budget, quiet=quiet) as watch:
         return optimize_study(
-            study, workers=workers, output=output, watch=watch, resume=resume, executor=executor
+            study,
+            executor=executor,
+            proof_workers=proof_workers,
+            output=output,
+            watch=watch,
+            resume=resume,
         )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from tpm_design.cli.guard import INTERRUPTED, NOT_PROVED, NOTHING_FEASIBLE
 from tpm_design.cli.results import NO_VALUE, error_text
 from tpm_design.cli.text import table
-from tpm_design.errors import UsageError
+from tpm_design.errors import unwritable
 from tpm_design.problem import Goal
 from tpm_design.report.words import asked, gap_percent
 from tpm_design.runs.optimality import gap_of
@@ -112,5 +112,5 @@ def write_comparison(output: Path, name: str, studies: Mapping[str, Study], runs
     try:
         path.write_text("".join(lines), encoding="utf-8")
     except OSError as error:
-        raise UsageError(f"The table cannot be written: {error.strerror}.", where=str(path)) from None
+        raise unwritable("The table cannot be written", error, path) from None
     return path

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 from tpm_design.errors import RefusedError, UsageError
-from tpm_design.runs.executors import Executor
+from tpm_design.runs.executors import Executor, Threads
 from tpm_design.study import Study
 
 LOCAL = "local"
@@ -34,11 +34,12 @@ def check_dask(dask: str | None, workers: int | None, studies: Iterable[Study]) 
 
 
 @contextmanager
-def evaluators(dask: str | None, workers: int) -> Iterator[Executor | None]:
-    """The cluster at an address, "local" for so many processes of this machine; None: threads evaluate.
+def evaluators(dask: str | None, workers: int) -> Iterator[Executor]:
+    """The cluster at an address, "local" for so many processes of this machine; None: threads.
     Raises UsageError."""
     if dask is None:
-        yield None
+        with closing(Threads(workers)) as threads:
+            yield threads
         return
     from tpm_design.runs.dask_workers import dask_workers
 

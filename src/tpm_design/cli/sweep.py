@@ -57,11 +57,10 @@ def sweep_one(
         run = sweep_study(
             study,
             shard=part,
-            workers=threads,
+            executor=executor,
             output=output,
             watch=watch,
             resume=folder,
-            executor=executor,
         )
     return _told(study, run, part, as_json=as_json)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from tpm_design.certificates.document import FILE, canonical
+from tpm_design.certificates.document import FILE
+from tpm_design.digests import canonical_sha256
 from tpm_design.report.escape import code, code_cell, table, text
 from tpm_design.report.reported import Reported, best_context
 from tpm_design.report.words import asked, machines_text, pose_text
@@ -72,7 +72,7 @@ def _certificate(reported: Reported) -> Mapping[str, Any] | None:
 def _unaltered(data: Mapping[str, Any]) -> bool:
     """Whether the contents have the hash that they carry."""
     contents = {name: value for name, value in data.items() if name != "sha256"}
-    return hashlib.sha256(canonical(contents)).hexdigest() == data.get("sha256")
+    return canonical_sha256(contents) == data.get("sha256")
 
 
 def _why(reported: Reported, one: Mapping[str, Any]) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from tpm_design.errors import UsageError
+from tpm_design.errors import UsageError, unwritable
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.report.drawing import mechanism_figure
 from tpm_design.report.good_pose import first_mode, good_pose
@@ -42,4 +42,4 @@ def write_drawing(kind: MechanismKind, path: Path) -> None:
     try:
         save(figure, path)
     except OSError as error:
-        raise UsageError(f"The drawing cannot be written: {error.strerror}.", where=str(path)) from None
+        raise unwritable("The drawing cannot be written", error, path) from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tpm_design.errors import UsageError
+from tpm_design.errors import unwritable
 from tpm_design.report.figures import pictures, write_pictures
 from tpm_design.report.markdown import report_markdown
 from tpm_design.report.reported import read_reported
@@ -26,9 +26,10 @@ def write_report(folder: Path, *, allow_code: bool = False) -> tuple[Path, ...]:
         report = folder / REPORT
         report.write_text(report_markdown(reported, found), encoding="utf-8")
     except OSError as error:
-        raise UsageError(
-            f"The report cannot be written: {error.strerror}.",
-            where=str(folder),
-            remedy="Check that the folder can be written to and that the disk is not full.",
+        raise unwritable(
+            "The report cannot be written",
+            error,
+            folder,
+            "Check that the folder can be written to and that the disk is not full.",
         ) from None
     return report, *images

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
+from tpm_design.digests import text_sha256
 from tpm_design.evaluation.result import Cutoff, Evaluation
 from tpm_design.problem import Design, Sample
 
@@ -46,4 +46,4 @@ def samples_digest(samples: Sequence[Sample]) -> str:
     if not samples:
         return ""
     text = json.dumps([asdict(sample) for sample in samples], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    return text_sha256(text)[:16]

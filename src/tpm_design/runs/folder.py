@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import os
@@ -15,7 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from tpm_design.errors import UsageError
+from tpm_design.errors import UsageError, unwritable
 from tpm_design.evaluation.result import Cutoff, Evaluation
 from tpm_design.problem import Problem
 from tpm_design.runs.durable import AppendedLines, replace_file
@@ -48,10 +47,8 @@ def create_run_folder(results: Path, study_name: str, study_hash: str) -> Path:
         except FileExistsError:
             continue
         except OSError as error:
-            raise UsageError(
-                f"The run folder cannot be made: {error.strerror}.",
-                where=str(parent),
-                remedy="Choose another folder with --output.",
+            raise unwritable(
+                "The run folder cannot be made", error, parent, "Choose another folder with --output."
             ) from None
         return folder
     raise UsageError("Too many runs began in this second.", where=str(parent), remedy="Try again.")
@@ -246,8 +243,3 @@ def provenance() -> dict[str, Any]:
             "processors": os.cpu_count(),
         },
     }
-
-
-def text_hash(text: str) -> str:
-    """SHA-256 of a text."""
-    return hashlib.sha256(text.encode()).hexdigest()

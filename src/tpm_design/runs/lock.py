@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import BinaryIO
 
-from tpm_design.errors import UsageError
+from tpm_design.errors import UsageError, unwritable
 
 FILE = "run.lock"
 BYTE = 1 << 30
@@ -52,10 +52,8 @@ def _held(path: Path) -> BinaryIO:
         try:
             file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
         except OSError as error:
-            raise UsageError(
-                f"The run folder cannot be locked: {error.strerror}.",
-                where=str(path),
-                remedy="Choose a folder in which you may write.",
+            raise unwritable(
+                "The run folder cannot be locked", error, path, "Choose a folder in which you may write."
             ) from None
         try:
             _lock(file)
@@ -74,10 +72,8 @@ def _held(path: Path) -> BinaryIO:
             ) from None
         except OSError as error:
             file.close()
-            raise UsageError(
-                f"The run folder cannot be locked: {error.strerror}.",
-                where=str(path),
-                remedy="Choose a folder on a file system with locks.",
+            raise unwritable(
+                "The run folder cannot be locked", error, path, "Choose a folder on a file system with locks."
             ) from None
 
 

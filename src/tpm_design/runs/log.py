@@ -15,7 +15,7 @@ from tpm_design.evaluation.slopes import Neighbours
 from tpm_design.optimizers.base import BudgetSpent
 from tpm_design.problem import Design, Problem
 from tpm_design.runs.entry import Answers, Entry, Key, design_key, samples_digest
-from tpm_design.runs.executors import Executor, Threads, in_order
+from tpm_design.runs.executors import Executor, in_order
 from tpm_design.runs.ranking import best_entry, rank
 
 
@@ -23,21 +23,20 @@ class EvaluationLog:
     """Every distinct design evaluated so far in one round. The one place that counts evaluations.
 
     ``record`` is called with each entry, in order, as soon as it is there. ``first``: number of the first.
-    ``answers``: evaluations that need not be repeated; they count like others. ``executor``: who evaluates,
-    ``workers`` threads of its own if None. ``optima``: designs that the method noted as local optima.
-    ``most_pieces``: in how many pieces each constraint came, at most.
+    ``answers``: evaluations that need not be repeated; they count like others. ``executor``: who evaluates.
+    ``optima``: designs that the method noted as local optima. ``most_pieces``: in how many pieces each
+    constraint came, at most.
     """
 
     def __init__(
         self,
         problem: Problem,
         *,
-        workers: int,
+        executor: Executor,
         record: Callable[[Entry], None] = lambda entry: None,
         first: int = 0,
         round_number: int = 1,
         answers: Answers = MappingProxyType({}),
-        executor: Executor | None = None,
     ) -> None:
         self.problem = problem
         self.judged_by = samples_digest(problem.samples)
@@ -49,13 +48,7 @@ class EvaluationLog:
         self.most_pieces: dict[str, int] = {}
         self._places: dict[Key, int] = {}
         self._record = record
-        self._executor: Executor = Threads(workers) if executor is None else executor
-        self._is_own = executor is None
-
-    def close(self) -> None:
-        """End the log's own threads; evaluations not begun are dropped."""
-        if self._is_own:
-            self._executor.close()
+        self._executor = executor
 
     def evaluations(
         self,

@@ -130,29 +130,23 @@ def search(
     problem: Problem,
     plan: SearchPlan,
     *,
-    workers: int,
+    executor: Executor,
     record: Callable[[Entry], None],
     stored: Sequence[Entry] = (),
-    executor: Executor | None = None,
 ) -> SearchResult:
-    """Run the plan. ``record`` gets each evaluation as it ends. Raises what ``check_plan`` raises.
-
-    ``executor``: who evaluates, ``workers`` threads if None.
+    """Run the plan. ``executor`` evaluates, ``record`` gets each evaluation as it ends. Raises what
+    ``check_plan`` raises.
 
     ``stored``: the log of an earlier search for the same problem; what is asked for again is answered from
     it. What is not, because the budget is another one, comes last and may be the best.
     Ctrl-C ends the search as "interrupted" with everything evaluated so far.
     """
     check_plan(problem, plan)
-    log = EvaluationLog(
-        problem, workers=workers, record=record, answers=answers_in(stored), executor=executor
-    )
+    log = EvaluationLog(problem, executor=executor, record=record, answers=answers_in(stored))
     try:
         ending, detail = search_all(log, plan, plan.budget)
     except KeyboardInterrupt:
         ending, detail = "interrupted", "The search was interrupted."
-    finally:
-        log.close()
     entries = (*log.entries, *left_over(stored, log.entries))
     best = best_entry(problem, entries)
     status = status_sentence(problem, best, entries, ending, detail)

@@ -11,9 +11,7 @@ from tpm_design.runs.optimize import SearchResult
 from tpm_design.runs.rounds import Proving, told_of
 
 
-def with_proved_knee(
-    problem: Problem, proving: Proving, result: SearchResult, *, workers: int
-) -> SearchResult:
+def with_proved_knee(problem: Problem, proving: Proving, result: SearchResult) -> SearchResult:
     """The result with a verdict on its knee, told in the status. Where nothing is feasible, or the search was
     interrupted, there is none; Ctrl-C leaves it out."""
     best = result.best
@@ -25,7 +23,7 @@ def with_proved_knee(
             best.evaluation.design,
             proving.tolerance,
             boxes=proving.boxes,
-            workers=workers,
+            workers=proving.workers,
             with_slack=True,
         )
     except KeyboardInterrupt:

@@ -59,10 +59,11 @@ on it each time the same requirement fails again: bounds over boxes are wider th
 @dataclass(frozen=True)
 class Proving:
     """For which machines the best design is to be proved (name → ±, SI, each limb by itself), with how many
-    boxes a statement."""
+    boxes a statement, by how many threads: those prove wherever designs are evaluated."""
 
     tolerance: Mapping[str, float]
     boxes: int
+    workers: int
 
 
 def search_certified(
@@ -70,10 +71,9 @@ def search_certified(
     plan: SearchPlan,
     proving: Proving,
     *,
-    workers: int,
+    executor: Executor,
     record: Callable[[Entry], None],
     stored: Sequence[Entry] = (),
-    executor: Executor | None = None,
 ) -> SearchResult:
     """Search and certify in rounds, until the best design is proved, no round can help or the budget ends.
 
@@ -83,11 +83,10 @@ def search_certified(
 
     ``stored``: the log of an earlier search for the same problem; a design that is asked for again and judged
     by the same samples is answered from it, verdicts are found anew. With another budget the rounds are
-    other ones: what they do not ask for is dropped at the end. ``executor``: who evaluates, ``workers``
-    threads if None; these prove in any case.
+    other ones: what they do not ask for is dropped at the end. ``executor``: who evaluates.
     """
     check_plan(problem, plan)
-    course = _Course(problem, plan, proving, workers, record, answers_in(stored), executor)
+    course = _Course(problem, plan, proving, executor, record, answers_in(stored))
     try:
         ending, detail = course.run()
     except KeyboardInterrupt:
@@ -119,13 +118,12 @@ class _Course:
         problem: Problem,
         plan: SearchPlan,
         proving: Proving,
-        workers: int,
+        executor: Executor,
         record: Callable[[Entry], None],
         answers: Answers,
-        executor: Executor | None,
     ) -> None:
-        self._problem, self._plan, self._proving, self._workers = problem, plan, proving, workers
-        self._record, self._answers, self._executor = record, answers, executor
+        self._problem, self._plan, self._proving = problem, plan, proving
+        self._executor, self._record, self._answers = executor, record, answers
         self._samples: tuple[Sample, ...] = ()
         self._first = 0
         self.entries: list[Entry] = []
@@ -160,7 +158,7 @@ class _Course:
             best.evaluation.design,
             self._proving.tolerance,
             boxes=self._proving.boxes,
-            workers=self._workers,
+            workers=self._proving.workers,
             with_slack=with_slack,
         )
 
@@ -173,12 +171,11 @@ class _Course:
         left = self._plan.budget - self._first
         log = EvaluationLog(
             replace(self._problem, samples=self._samples),
-            workers=self._workers,
+            executor=self._executor,
             record=self._record,
             first=self._first,
             round_number=len(self.rounds) + 1,
             answers=self._answers,
-            executor=self._executor,
         )
         try:
             if not self.rounds:
@@ -194,7 +191,6 @@ class _Course:
                 ending, detail = _refine(log, self._plan, left)
             return ending, detail, log.best()
         finally:
-            log.close()
             self.entries += log.entries
             self.optima += log.optima
 

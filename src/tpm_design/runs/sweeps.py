@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,7 +15,7 @@ from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.problem import Design, Problem
 from tpm_design.runs.entry import Entry
-from tpm_design.runs.executors import Executor, Threads
+from tpm_design.runs.executors import Executor
 from tpm_design.runs.folder import entry_to_json
 from tpm_design.runs.shipping import portable
 
@@ -82,10 +82,9 @@ def sweep(
     problem: Problem,
     points: Sequence[Point],
     *,
-    workers: int,
+    executor: Executor,
     record: Callable[[Entry], None],
     stored: Sequence[Entry] = (),
-    executor: Executor | None = None,
 ) -> SweepResult:
     """Evaluate the points, then some of them again in reverse order: an evaluation depends on its design
     alone, so that a row which differs, if only in its last bit, shows a hidden state.
@@ -94,7 +93,7 @@ def sweep(
     status "failed" and the reason. Ctrl-C ends the sweep as "interrupted" with everything evaluated so far.
 
     ``stored``: the log of an earlier sweep of these points, which is not evaluated again, but for points that
-    failed: whether they showed a bug is not in it. ``executor``: who evaluates, ``workers`` threads if None.
+    failed: whether they showed a bug is not in it. ``executor``: who evaluates.
     """
     entries = {entry.number: entry for entry in stored}
     faults: dict[int, Exception] = {}
@@ -104,24 +103,21 @@ def sweep(
     kept = {number for number, entry in entries.items() if entry.evaluation.status != "failed"}
     left = [point for point in points if point.number not in kept]
     again = [point for point in reversed(points) if point.number % REPEATED_EVERY == 0]
-    with ExitStack() as stack:
-        if executor is None:
-            executor = stack.enter_context(closing(Threads(workers)))
-        try:
-            with closing(executor.as_they_end(_evaluate, problem, left)) as forward:
-                for _, (entry, fault) in forward:
-                    if fault is not None:
-                        faults[entry.number] = fault
-                    if entry.number not in entries:
-                        entries[entry.number] = entry
-                        record(entry)
-            with closing(executor.as_they_end(_evaluate, problem, again)) as backward:
-                for _, (entry, _) in backward:
-                    repeated += 1
-                    if not same_row(entry, entries[entry.number]):
-                        disagreements.append(entry.number)
-        except KeyboardInterrupt:
-            ending = "interrupted"
+    try:
+        with closing(executor.as_they_end(_evaluate, problem, left)) as forward:
+            for _, (entry, fault) in forward:
+                if fault is not None:
+                    faults[entry.number] = fault
+                if entry.number not in entries:
+                    entries[entry.number] = entry
+                    record(entry)
+        with closing(executor.as_they_end(_evaluate, problem, again)) as backward:
+            for _, (entry, _) in backward:
+                repeated += 1
+                if not same_row(entry, entries[entry.number]):
+                    disagreements.append(entry.number)
+    except KeyboardInterrupt:
+        ending = "interrupted"
     ordered = tuple(entries[number] for number in sorted(entries))
     return SweepResult(ordered, repeated, tuple(sorted(disagreements)), ending, faults)
 

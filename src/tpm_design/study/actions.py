@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 from tpm_design.certificates.document import FILE as CERTIFICATE
 from tpm_design.certificates.document import document, write_document
 from tpm_design.certificates.verdict import Verdict
+from tpm_design.digests import text_sha256
 from tpm_design.errors import UsageError, did_you_mean
 from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.problem import Design
 from tpm_design.runs.entry import Entry, answer_key
 from tpm_design.runs.executors import Executor
-from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run, text_hash
+from tpm_design.runs.folder import STUDY, RunWriter, create_run_folder, provenance, read_run
 from tpm_design.runs.lock import sole_writer
 from tpm_design.runs.marks import front_marks
 from tpm_design.runs.optimality import gap_of, with_bound
@@ -77,16 +78,16 @@ def plan_of(study: Study) -> SearchPlan:
 def optimize_study(
     study: Study,
     *,
-    workers: int,
+    executor: Executor,
+    proof_workers: int,
     output: Path | None,
     watch: Callable[[Entry], None] = lambda entry: None,
     resume: Path | None = None,
-    executor: Executor | None = None,
 ) -> Run:
     """Search the study's design space; with ``output`` the run is written below it as it happens.
 
     ``watch`` sees each evaluation. ``resume``: a run folder to go on in instead of a new one.
-    ``executor``: who evaluates, ``workers`` threads if None; these prove in any case. Raises
+    ``executor``: who evaluates; ``proof_workers`` threads of this process prove. Raises
     RefusedError or UsageError before anything runs, RunStoppedError where the run cannot be written.
     """
     plan = plan_of(study)
@@ -97,7 +98,7 @@ def optimize_study(
     if folder is None and output is not None:
         folder = create_run_folder(output, study.name, study.study_hash)
     if folder is None:
-        result = _searched(study, plan, workers, executor, watch, ())
+        result = _searched(study, plan, executor, proof_workers, watch, ())
     else:
         with sole_writer(folder):
             stored = None
@@ -105,7 +106,7 @@ def optimize_study(
                 # only now can nobody else write to it
                 check_resumable(study, folder)
                 stored = read_run(folder).entries
-            result = _written(study, plan, workers, executor, watch, folder, stored)
+            result = _written(study, plan, executor, proof_workers, watch, folder, stored)
     best = None if result.best is None else result.best.evaluation
     table = evaluations_frame(study, result.entries)
     front = tuple(entry.evaluation for entry in result.front)
@@ -115,31 +116,29 @@ def optimize_study(
 def _searched(
     study: Study,
     plan: SearchPlan,
-    workers: int,
-    executor: Executor | None,
+    executor: Executor,
+    proof_workers: int,
     record: Callable[[Entry], None],
     stored: Sequence[Entry],
 ) -> SearchResult:
     problem = study.problem
     if study.certification is None:
-        result = search(problem, plan, workers=workers, record=record, stored=stored, executor=executor)
+        result = search(problem, plan, executor=executor, record=record, stored=stored)
         return with_bound(problem, plan, result)
-    proving = Proving(study.certification.tolerance, study.certification.boxes)
+    proving = Proving(study.certification.tolerance, study.certification.boxes, proof_workers)
     if len(problem.objectives) > 1:
-        result = search(problem, plan, workers=workers, record=record, stored=stored, executor=executor)
-        result = with_proved_knee(problem, proving, result, workers=workers)
+        result = search(problem, plan, executor=executor, record=record, stored=stored)
+        result = with_proved_knee(problem, proving, result)
     else:
-        result = search_certified(
-            problem, plan, proving, workers=workers, record=record, stored=stored, executor=executor
-        )
+        result = search_certified(problem, plan, proving, executor=executor, record=record, stored=stored)
     return with_bound(study.problem, plan, result)
 
 
 def _written(
     study: Study,
     plan: SearchPlan,
-    workers: int,
-    executor: Executor | None,
+    executor: Executor,
+    proof_workers: int,
     watch: Callable[[Entry], None],
     folder: Path,
     stored: tuple[Entry, ...] | None,
@@ -157,7 +156,7 @@ def _written(
                 writer.record(entry)
             watch(entry)
 
-        result = _searched(study, plan, workers, executor, record, stored or ())
+        result = _searched(study, plan, executor, proof_workers, record, stored or ())
         if result.verdict is not None:
             data = document(study.problem, study.resolved(), study.study_hash, result.verdict)
             write_document(folder / CERTIFICATE, data)
@@ -172,13 +171,13 @@ def _written(
             "polish": plan.polish,
             "seed": plan.seed,
             "budget": plan.budget,
-            "workers": workers if executor is None else executor.workers,
+            "workers": executor.workers,
             "remarks": list(result.remarks),
             **_front_data(study, result),
             **_bound_data(result),
             **({} if study.certification is None else _rounds_data(result)),
             "study_hash": study.study_hash,
-            "study_file_hash": text_hash(study_text),
+            "study_file_hash": text_sha256(study_text),
             **provenance(),
             **({} if stored is None else {"resumed_after": len(stored)}),
             "seconds": round(time.perf_counter() - began, 3),

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tpm_design.digests import canonical_sha256
 from tpm_design.errors import UsageError
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.problem import Problem
@@ -66,8 +67,7 @@ class Study:
     @property
     def study_hash(self) -> str:
         """SHA-256 of the resolved study: equal for studies that ask the same, however they are written."""
-        canonical = json.dumps(self.resolved(), sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-        return hashlib.sha256(canonical.encode()).hexdigest()
+        return canonical_sha256(self.resolved())
 
     def evaluate(self, values: Mapping[str, float | str]) -> Evaluation:
         """Every metric of one design. ``values``: SI, by name; a free quantity that is not given takes its
@@ -92,6 +92,7 @@ class Study:
         Raises RefusedError where the method cannot search this problem, UsageError on bad arguments and runs
         of another study or version, RunStoppedError where the run folder cannot be written.
         """
+        from tpm_design.runs.executors import Threads
         from tpm_design.study.actions import optimize_study
         from tpm_design.study.resuming import run_to_resume
 
@@ -100,7 +101,8 @@ class Study:
         study = self.searched_with(seed=seed, budget=budget)
         below = None if output is None else Path(output)
         folder = None if resume is None else run_to_resume(study, resume, below)
-        return optimize_study(study, workers=workers, output=below, resume=folder)
+        with closing(Threads(workers)) as threads:
+            return optimize_study(study, executor=threads, proof_workers=workers, output=below, resume=folder)
 
     def searched_with(self, *, seed: int | None = None, budget: int | None = None) -> Study:
         """The same study with another seed or budget. Raises UsageError for values a study cannot have."""

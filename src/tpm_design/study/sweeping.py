@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tpm_design.digests import text_sha256
 from tpm_design.errors import UsageError
 from tpm_design.runs.entry import Entry
 from tpm_design.runs.executors import Executor
@@ -22,7 +23,6 @@ from tpm_design.runs.folder import (
     create_run_folder,
     provenance,
     read_run,
-    text_hash,
 )
 from tpm_design.runs.lock import sole_writer
 from tpm_design.runs.ranking import best_entry
@@ -51,15 +51,14 @@ def sweep_study(
     study: Study,
     *,
     shard: Shard,
-    workers: int,
+    executor: Executor,
     output: Path | None,
     watch: Callable[[Entry], None] = lambda entry: None,
     resume: Path | None = None,
-    executor: Executor | None = None,
 ) -> SweepRun:
     """Evaluate the study's plan, or one shard of it; with ``output`` the run is written below it as it
     happens. ``watch`` sees each evaluation. ``resume``: a run folder to go on in instead of a new one.
-    ``executor``: who evaluates, ``workers`` threads if None. Raises UsageError before anything runs,
+    ``executor``: who evaluates. Raises UsageError before anything runs,
     RunStoppedError where the run cannot be written."""
     points = sweep_points(study, shard)
     if resume is not None:
@@ -72,7 +71,7 @@ def sweep_study(
     def swept(record: Callable[[Entry], None], stored: Sequence[Entry]) -> SweepResult:
         for entry in stored:
             watch(entry)
-        return sweep(study.problem, points, workers=workers, record=record, stored=stored, executor=executor)
+        return sweep(study.problem, points, executor=executor, record=record, stored=stored)
 
     if folder is None:
         return _ended(study, swept(watch, ()), shard, None)
@@ -96,7 +95,7 @@ def sweep_study(
                 run,
                 shard,
                 told,
-                workers=workers if executor is None else executor.workers,
+                workers=executor.workers,
                 seconds=time.perf_counter() - began,
                 merged=(),
             )
@@ -194,7 +193,7 @@ def _finish(
         "workers": workers,
         "merged": list(merged),
         "study_hash": study.study_hash,
-        "study_file_hash": text_hash(dump_yaml(study.resolved())),
+        "study_file_hash": text_sha256(dump_yaml(study.resolved())),
         **provenance(),
         **told,
         "seconds": round(seconds, 3),
