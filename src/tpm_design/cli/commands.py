@@ -26,7 +26,6 @@ from tpm_design.report.words import gap_text, pose_text, pose_unit_names
 from tpm_design.runs.executors import SWITCH_INTERVAL, Executor
 from tpm_design.runs.folder import STUDY, newest_run, read_run
 from tpm_design.runs.optimality import gap_of
-from tpm_design.runs.optimize import check_plan
 from tpm_design.runs.search import best_entry
 from tpm_design.study import (
     Study,
@@ -37,7 +36,7 @@ from tpm_design.study import (
     study_schema,
     template,
 )
-from tpm_design.study.actions import Run, optimize_study, plan_of, pose_values
+from tpm_design.study.actions import Run, check_search, optimize_study, pose_values
 from tpm_design.study.resuming import LATEST, check_resumable, run_to_resume
 
 RESULTS = Path("results")
@@ -63,7 +62,7 @@ def validate_study(path: Path, *, resolved: bool, allow_code: bool, quiet: bool)
     comparison = load_comparison(path, allow_code=allow_code)
     if comparison is not None:
         for study in comparison.studies.values():
-            check_plan(study.problem, plan_of(study))
+            check_search(study)
         if resolved:
             print("---\n".join(dump_yaml(study.resolved()) for study in comparison.studies.values()), end="")
         elif not quiet:
@@ -71,7 +70,7 @@ def validate_study(path: Path, *, resolved: bool, allow_code: bool, quiet: bool)
         return None
     study = load_study(path, allow_code=allow_code)
     if study.problem.variables:
-        check_plan(study.problem, plan_of(study))
+        check_search(study)
     if resolved:
         print(dump_yaml(study.resolved()), end="")
     elif not quiet:
@@ -292,7 +291,7 @@ def _runs_to_resume(studies: Mapping[str, Study], resume: str | None, output: Pa
 
 def _check_search(study: Study, resume: Path | None) -> None:
     """Refuse what cannot work before anything is started."""
-    check_plan(study.problem, plan_of(study))
+    check_search(study)
     if resume is not None:
         check_resumable(study, resume)
 
