@@ -22,6 +22,7 @@ from tpm_design.design_space import with_changes
 from tpm_design.errors import UsageError
 from tpm_design.mechanisms import mechanism_kind
 from tpm_design.problem import Design, evaluate
+from tpm_design.report.local_optima import other_optima_text
 from tpm_design.report.words import gap_text, pose_text, pose_unit_names
 from tpm_design.runs.executors import SWITCH_INTERVAL, Executor
 from tpm_design.runs.folder import STUDY, newest_run, read_run
@@ -340,7 +341,9 @@ def _run_text(study: Study, run: Run) -> str:
         after.append(f"Next: tpm-design optimize {run.folder / STUDY} --resume {run.folder}{allow}")
     else:
         after.append(f"Next: tpm-design report {run.folder}{allow}")
-    lines = [run.status, *_gap_lines(study, run), *run.result.remarks, *after]
+    others = other_optima_text(study.problem, study.units, run.result.optima)
+    more = [] if others is None else [others]
+    lines = [run.status, *_gap_lines(study, run), *more, *run.result.remarks, *after]
     return "\n\n".join([*parts, "\n".join(lines)])
 
 
