@@ -77,8 +77,8 @@ def validate_study(path: Path, *, resolved: bool, allow_code: bool, quiet: bool)
     elif not quiet:
         problem = study.problem
         print(
-            f"{path} is valid: {problem.kind.title}, {len(problem.variables)} free quantities, "
-            f"{len(problem.objectives)} objectives, {len(problem.constraints)} constraints."
+            f"{path} is valid: {problem.kind.title}; free quantities: {len(problem.variables)}, "
+            f"objectives: {len(problem.objectives)}, constraints: {len(problem.constraints)}."
         )
     return None
 
