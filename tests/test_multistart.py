@@ -24,6 +24,8 @@ from tpm_design.optimizers.descent import Walk, descend
 from tpm_design.optimizers.places import looked_at
 from tpm_design.optimizers.quadratic import Program, elastic_step
 from tpm_design.optimizers.starts import SAME
+from tpm_design.report.local_optima import optima_lines, other_optima_text
+from tpm_design.report.reported import read_reported
 from tpm_design.runs.entry import Entry
 from tpm_design.runs.executors import Threads
 from tpm_design.runs.folder import entry_to_json, read_run
@@ -326,6 +328,30 @@ def test_the_result_lists_an_optimum_for_each_choice(whole: Path) -> None:
     summary = json.loads((whole / "run.json").read_text(encoding="utf-8"))
     assert summary["optima_ids"] == [int(row["id"]) for row in rows]
     assert summary["best_id"] == summary["optima_ids"][0]
+
+
+def test_the_report_has_a_row_for_every_optimum(whole: Path) -> None:
+    numbers = json.loads((whole / "run.json").read_text(encoding="utf-8"))["optima_ids"]
+    reported = read_reported(whole)
+    heading, *lines = optima_lines(reported)
+    assert heading == f"## Local optima ({len(numbers)})"
+    rows = [line.split(" | ")[:2] for line in lines if line.startswith("| ")][2:]
+    assert rows == [[f"| {place}", str(number)] for place, number in enumerate(numbers, start=1)]
+
+
+def test_what_the_command_says_of_the_other_optima(whole: Path) -> None:
+    reported = read_reported(whole)
+    entries = {entry.number: entry for entry in reported.run.entries}
+    optima = [entries[n] for n in json.loads((whole / "run.json").read_text(encoding="utf-8"))["optima_ids"]]
+    problem, units = reported.problem, reported.study.units
+    lengths = [units.written(entry.evaluation.metrics["total_link_length"], "m") for entry in optima]
+    assert other_optima_text(problem, units, optima[:1]) is None
+    one = other_optima_text(problem, units, optima[:2])
+    assert one == f"Another local optimum is in designs.csv: total_link_length {lengths[1]}."
+    several = other_optima_text(problem, units, [*optima, optima[-1]])
+    assert several is not None
+    assert several.startswith(f"{len(optima)} other local optima are in designs.csv: total_link_length ")
+    assert lengths[-1] in several
 
 
 def test_reproducing_a_run_evaluates_every_optimum(whole: Path) -> None:

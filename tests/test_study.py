@@ -567,6 +567,13 @@ BAD = {
         "accuracy:",
         ["region_samples cannot be 2", "at least 3"],
     ),
+    "impossible share": ("coverage, min: 1", "coverage, min: 95", "coverage", ["never above 1", "up to 1"]),
+    "impossible conditioning": (
+        "drive: motor, min: 0.3",
+        "drive: motor, min: 3",
+        "conditioning_min",
+        ["never above 1", "min 3 cannot be met"],
+    ),
     "tolerance name": ("{db: 0.1,", "{da: 0.1,", "certify:", ["no parameter 'da'", "Known: db"]),
     "tolerance sign": ("{db: 0.1,", "{db: -0.1,", "certify:", ["cannot be -0.1", "at least 0"]),
     "sweep type": ("type: grid", "type: gird", "sweep:", ["sweep.type cannot be 'gird'", "grid"]),

@@ -259,6 +259,8 @@ def test_what_cannot_work_is_refused_before_anything_is_written(
     outcome = tpm_design("optimize", study, "--output", tmp_path / "results")
     assert (outcome.code, outcome.output) == (2, "")
     assert said in outcome.errors
+    line = next(n for n, text in enumerate(STUDY.replace(old, new).splitlines(), 1) if "optimizer:" in text)
+    assert f"{study}:{line}: " in outcome.errors
     assert not (tmp_path / "results").exists()
 
 

@@ -116,7 +116,8 @@ def test_a_sweep_has_a_row_for_every_point_of_its_plan(whole: tuple[Outcome, Pat
     feasible = [row for row in rows if row["status"] == "feasible"]
     best = min(feasible, key=lambda row: float(row["total_link_length [mm]"]))
     assert (summary["best_id"], summary["feasible"]) == (int(best["id"]), True)
-    assert f"Best feasible design: point {best['id']}." in outcome.output
+    length = float(best["total_link_length [mm]"])
+    assert f"Best feasible design: point {best['id']}, total_link_length {length:.6g} mm" in outcome.output
     stored = json.loads(tpm_design("evaluate", run, "--json").output)
     assert stored["design"]["r"]["value"] == float(best["r [mm]"])
 

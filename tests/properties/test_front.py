@@ -10,7 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tpm_design.runs.front import FloatArray, FrontBox, extended, extremes, front_box, knee, non_dominated
+from tpm_design.runs.front import (
+    FloatArray,
+    FrontBox,
+    extended,
+    extremes,
+    front_box,
+    knee,
+    non_dominated,
+    spread,
+)
 
 # few values, so that there are ties and equal rows
 TABLES = st.tuples(st.integers(1, 30), st.integers(2, 4)).flatmap(
@@ -139,3 +148,23 @@ def test_hypervolume_of_any_two_columns_is_the_sum_of_its_strips(table: FloatArr
         area += (1.0 - x) * max(0.0, lowest - y)
         lowest = min(lowest, y)
     assert box.hypervolume(table) == pytest.approx(area, abs=1e-12)
+
+
+@given(TABLES, st.integers(1, 12))
+@settings(max_examples=100, deadline=None)
+def test_rows_that_stand_for_a_front_are_in_order_and_hold_those_to_be_kept(
+    table: FloatArray, count: int
+) -> None:
+    front = table[non_dominated(table)]
+    kept = [*extremes(front).tolist(), knee(front)]
+    rows = spread(front, kept, count)
+    assert rows == sorted(set(rows))
+    assert set(kept) <= set(rows) <= set(range(len(front)))
+    assert len(rows) == max(min(count, len(front)), len(set(kept)))
+
+
+def test_a_crowd_on_a_front_counts_as_one_and_the_widest_gaps_are_shown() -> None:
+    crowd = np.linspace(0.0, 1e-3, 90)
+    first = np.concatenate([crowd, [0.25, 0.5, 0.75, 1.0]])
+    front = np.column_stack([first, 1.0 - first])
+    assert spread(front, [0, 93], 5) == [0, 90, 91, 92, 93]

@@ -40,8 +40,12 @@ def list_things(what: str | None, *, as_json: bool) -> int | None:
         return None
     texts = []
     for room, things in rooms.items():
-        rows = [[name, unit_text(thing), summary(thing)] for name, thing in things.items()]
-        texts.append(table([room, "unit", "what it is"], rows))
+        measured = any(map(unit_text, things.values()))
+        rows = [
+            [name, *([unit_text(thing)] if measured else []), summary(thing)]
+            for name, thing in things.items()
+        ]
+        texts.append(table([room, *(["unit"] if measured else []), "what it is"], rows))
     print("\n\n".join(texts))
     return None
 

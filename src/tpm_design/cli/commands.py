@@ -23,11 +23,11 @@ from tpm_design.errors import UsageError, unwritable
 from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.mechanisms import mechanism_kind
 from tpm_design.problem import Design
+from tpm_design.report.local_optima import other_optima_text
 from tpm_design.report.words import gap_text, pose_text, pose_unit_names
 from tpm_design.runs.executors import SWITCH_INTERVAL, Executor
 from tpm_design.runs.folder import STUDY, newest_run, read_run
 from tpm_design.runs.optimality import gap_of
-from tpm_design.runs.optimize import check_plan
 from tpm_design.runs.ranking import best_entry
 from tpm_design.study import (
     Study,
@@ -38,7 +38,7 @@ from tpm_design.study import (
     study_schema,
     template,
 )
-from tpm_design.study.actions import Run, optimize_study, plan_of, pose_values
+from tpm_design.study.actions import Run, check_search, optimize_study, pose_values
 from tpm_design.study.resuming import LATEST, check_resumable, run_to_resume
 
 RESULTS = Path("results")
@@ -64,7 +64,7 @@ def validate_study(path: Path, *, resolved: bool, allow_code: bool, quiet: bool)
     comparison = load_comparison(path, allow_code=allow_code)
     if comparison is not None:
         for study in comparison.studies.values():
-            check_plan(study.problem, plan_of(study))
+            check_search(study)
         if resolved:
             print("---\n".join(dump_yaml(study.resolved()) for study in comparison.studies.values()), end="")
         elif not quiet:
@@ -72,14 +72,14 @@ def validate_study(path: Path, *, resolved: bool, allow_code: bool, quiet: bool)
         return None
     study = load_study(path, allow_code=allow_code)
     if study.problem.variables:
-        check_plan(study.problem, plan_of(study))
+        check_search(study)
     if resolved:
         print(dump_yaml(study.resolved()), end="")
     elif not quiet:
         problem = study.problem
         print(
-            f"{path} is valid: {problem.kind.title}, {len(problem.variables)} free quantities, "
-            f"{len(problem.objectives)} objectives, {len(problem.constraints)} constraints."
+            f"{path} is valid: {problem.kind.title}; free quantities: {len(problem.variables)}, "
+            f"objectives: {len(problem.objectives)}, constraints: {len(problem.constraints)}."
         )
     return None
 
@@ -293,7 +293,7 @@ def _runs_to_resume(studies: Mapping[str, Study], resume: str | None, output: Pa
 
 def _check_search(study: Study, resume: Path | None) -> None:
     """Refuse what cannot work before anything is started."""
-    check_plan(study.problem, plan_of(study))
+    check_search(study)
     if resume is not None:
         check_resumable(study, resume)
 
@@ -347,7 +347,9 @@ def _run_text(study: Study, run: Run) -> str:
         after.append(f"Next: tpm-design optimize {run.folder / STUDY} --resume {run.folder}{allow}")
     else:
         after.append(f"Next: tpm-design report {run.folder}{allow}")
-    lines = [run.status, *_gap_lines(study, run), *run.result.remarks, *after]
+    others = other_optima_text(study.problem, study.units, run.result.optima)
+    more = [] if others is None else [others]
+    lines = [run.status, *_gap_lines(study, run), *more, *run.result.remarks, *after]
     return "\n\n".join([*parts, "\n".join(lines)])
 
 

@@ -16,6 +16,8 @@ from tpm_design.runs.tables import goal_unit, parameter_columns
 from tpm_design.units import Units
 
 NO_VALUE = "–"
+SAME_SLACK = 1e-9
+"""Rounding between a slack and the distance of its value to the bound, as a share of the metric's scale."""
 
 
 def design_rows(problem: Problem, units: Units, chosen: Design) -> list[list[str]]:
@@ -38,17 +40,32 @@ def _metric_row(problem: Problem, units: Units, evaluation: Evaluation, goal: Go
     unit = goal_unit(problem, goal)
     value = evaluation.metrics.get(goal.label, math.nan)
     error = evaluation.errors.get(goal.label, math.nan)
-    note = "; ".join(
-        f"{name}: {text}" for name, text in evaluation.notes.items() if name.startswith(f"{goal.label}_")
-    )
+    notes = [
+        f"{name}: {text}".removeprefix(f"{goal.label}_")
+        for name, text in evaluation.notes.items()
+        if name.startswith(f"{goal.label}_")
+    ]
+    if limited_by_sample(goal, evaluation):
+        notes.insert(0, "in worst sample")
     return [
         goal.label,
         units.written(value, unit) if math.isfinite(value) else NO_VALUE,
         f"± {error_text(units, error, unit)}" if math.isfinite(value) else NO_VALUE,
         asked(goal, units, unit),
         _slack_text(problem, units, evaluation, goal, unit),
-        note.removeprefix(f"{goal.label}_"),
+        "; ".join(notes),
     ]
+
+
+def limited_by_sample(goal: Goal, evaluation: Evaluation) -> bool:
+    """Whether a machine or pose that had to be met besides leaves a constraint less than its value does."""
+    slack, value = evaluation.slacks.get(goal.label, math.nan), evaluation.metrics.get(goal.label, math.nan)
+    ends = [value - goal.minimum] if goal.minimum is not None else []
+    ends += [goal.maximum - value] if goal.maximum is not None else []
+    if not slack >= 0.0 or not ends:
+        return False
+    own = min(ends) - evaluation.errors.get(goal.label, math.nan)
+    return slack < own - SAME_SLACK * goal.metric.scale
 
 
 def error_text(units: Units, error: float, unit: str) -> str:

@@ -120,7 +120,12 @@ def _text(study: Study, run: SweepRun, shard: Shard) -> str:
     allow = " --allow-code" if study.plug_in else ""
     lines = [run.status, f"Run: {run.folder}", f"Next: tpm-design {_following(run, shard)}{allow}"]
     if run.best is not None and run.best.evaluation.status == "feasible":
-        lines.insert(1, f"Best feasible design: point {run.best.number}.")
+        reached = (
+            f", {goal.label} {study.units.written(run.best.evaluation.metrics[goal.label], unit)}"
+            for goal in problem.objectives
+            for unit in (goal_unit(problem, goal),)
+        )
+        lines.insert(1, f"Best feasible design: point {run.best.number}{''.join(reached)}.")
     return "\n\n".join([*parts, "\n".join(lines)])
 
 

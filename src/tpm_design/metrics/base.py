@@ -79,7 +79,8 @@ class Metric:
     """One figure of merit. ``scale`` (in the metric's SI unit) makes its violation dimensionless. ``notes``:
     names of the notes its measurements may carry. ``refusal(kind, limits)``: why it means nothing for a
     mechanism with these limits, None where it does; ``drives``: those of the mechanism's drives for which it
-    does, the usual one first. ``cost``: what it takes; cheap ones are measured first."""
+    does, the usual one first. ``cost``: what it takes; cheap ones are measured first. ``greatest``: what it
+    can never exceed, in its SI unit."""
 
     name: str
     unit: str
@@ -95,6 +96,7 @@ class Metric:
     refusal: Callable[[MechanismKind, Mapping[str, Any]], str | None] = never_refused
     drives: Callable[[MechanismKind], tuple[str, ...]] = lambda kind: kind.drives
     cost: Cost = "extreme"
+    greatest: float = float("inf")
 
     def option(self, name: str) -> Option | None:
         return next((option for option in self.options if option.name == name), None)

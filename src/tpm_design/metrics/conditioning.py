@@ -211,14 +211,14 @@ def _share_of(options: Mapping[str, Any], integral: float, volume: float, field:
 METRICS = (
     Metric(
         "conditioning_min", "-", "maximize", 1.0, "least 1/κ over the domain", SOURCE, _minimum,
-        (NORM, DRIVE, OVER), refusal=_incomparable,
+        (NORM, DRIVE, OVER), refusal=_incomparable, greatest=1.0,
     ),
     Metric(
         "conditioning_mean", "-", "maximize", 1.0, "volume mean of 1/κ (GCI)", SOURCE, _mean,
-        (NORM, DRIVE, OVER), refusal=_no_volume, cost="rays",
+        (NORM, DRIVE, OVER), refusal=_no_volume, cost="rays", greatest=1.0,
     ),
     Metric(
         "conditioning_share", "-", "maximize", 1.0, "share of the domain with 1/κ ≥ threshold", SOURCE,
-        _share, (NORM, DRIVE, OVER, THRESHOLD), refusal=_no_volume, cost="rays",
+        _share, (NORM, DRIVE, OVER, THRESHOLD), refusal=_no_volume, cost="rays", greatest=1.0,
     ),
 )  # fmt: skip

@@ -56,7 +56,7 @@ METRICS = (
         "transmission_min", "-", "maximize", 1.0,
         "least input or output transmission index over the region",
         "J. Wang, C. Wu, X.-J. Liu, Performance evaluation of parallel manipulators, 2010",
-        _transmission, (DRIVE,), refusal=_no_transmission, drives=_pushing,
+        _transmission, (DRIVE,), refusal=_no_transmission, drives=_pushing, greatest=1.0,
     ),
     Metric(
         "position_sensitivity", "-", "minimize", 1.0,

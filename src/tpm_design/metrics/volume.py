@@ -135,7 +135,7 @@ METRICS = (
     Metric(
         "coverage", "-", "maximize", 1.0,
         "largest share of the region that lies in one aspect; 1 when all of it does", RAYS, _coverage,
-        cost="rays",
+        cost="rays", greatest=1.0,
     ),
     Metric(
         "workspace_ratio", "-", "maximize", 1.0, "singularity-free volume over robot_size³", RAYS,

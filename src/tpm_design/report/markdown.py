@@ -13,6 +13,7 @@ from tpm_design.report.certified import certificate_lines
 from tpm_design.report.escape import code, code_cell, table, text
 from tpm_design.report.figures import DRAWING, FIGURES, Picture
 from tpm_design.report.fronts import front_lines
+from tpm_design.report.local_optima import optima_lines
 from tpm_design.report.readings import AT_BOUND, at_end, limiting, nearest_constraint, readings
 from tpm_design.report.reported import Reported
 from tpm_design.report.swept import sweep_lines
@@ -53,6 +54,7 @@ def report_markdown(reported: Reported, pictures: Sequence[Picture]) -> str:
         certificate_lines(reported),
         [] if reported.swept else _limits(reported),
         [] if reported.swept else _optimality(reported),
+        [] if reported.swept else optima_lines(reported),
         _evaluated(reported) if reported.swept else _search(reported),
         _figures("Figures", [picture for picture in pictures if picture.file != DRAWING]),
         _caveats(reported),
@@ -230,6 +232,8 @@ def _limits(reported: Reported) -> list[str]:
         lines.append(
             "Nothing binds: no constraint is at its bound and no quantity at an end of its range."
             if nearest is None
+            else f"Nothing binds: the nearest constraint is {code(nearest.goal.label)}."
+            if reported.front
             else f"Nothing binds yet: the nearest constraint is {code(nearest.goal.label)}. "
             "A larger budget may find a better design."
         )

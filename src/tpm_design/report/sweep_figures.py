@@ -76,7 +76,9 @@ def map_figure(reported: Reported) -> Figure | None:
         axes.set_facecolor(PALE)
         mesh = axes.pcolormesh(columns, rows, cells, shading="nearest", cmap="cividis")
         if plan_size(plan) <= MOST_MARKED:
-            axes.scatter(columns[column_of[feasible]], rows[row_of[feasible]], s=6, color=INK, linewidths=0)
+            # ringed in white: seen on the dark end of the colours too
+            across_at, up_at = columns[column_of[feasible]], rows[row_of[feasible]]
+            axes.scatter(across_at, up_at, s=14, color=INK, edgecolors="white", linewidths=0.8)
         bar = figure.colorbar(mesh, ax=axes)
         bar.ax.tick_params(labelsize=SMALL)
         axes.set_title(wrapped(_heading(reported, goal), 34), fontsize=SMALL)

@@ -5,6 +5,7 @@ Arrays of objectives are (N, k), finite, and less is better in every column.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,6 +72,23 @@ def _shares(front: FloatArray) -> FloatArray:
     width = front.max(axis=0) - least
     shares: FloatArray = (front - least) / np.where(width > 0.0, width, 1.0)
     return shares
+
+
+def spread(front: FloatArray, kept: Sequence[int], count: int) -> list[int]:
+    """At most ``count`` rows that stand for the whole front, in order: those ``kept``, then each time the row
+    farthest from all that are chosen, each objective as a share of the front's range (Gonzalez, 1985)."""
+    shares = _shares(front)
+    chosen = list(dict.fromkeys(kept))
+    nearest = np.full(len(front), np.inf)
+    for row in chosen:
+        nearest = np.minimum(nearest, np.linalg.norm(shares - shares[row], axis=1))
+    while len(chosen) < min(count, len(front)):
+        # those that are chosen are at distance 0 from themselves, others perhaps too: of equal objectives
+        nearest[chosen] = -1.0
+        row = int(np.argmax(nearest))
+        chosen.append(row)
+        nearest = np.minimum(nearest, np.linalg.norm(shares - shares[row], axis=1))
+    return sorted(chosen)
 
 
 @dataclass(frozen=True)

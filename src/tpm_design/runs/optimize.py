@@ -43,6 +43,8 @@ REMEDIES = {
     "interrupted": "Resume it to go on.",
 }
 """What to do about each ending where a feasible design was found."""
+ENDED_EARLY = ("budget spent", "interrupted")
+"""Endings of searches that would have gone on with a larger budget."""
 
 
 @dataclass(frozen=True)
@@ -282,9 +284,10 @@ def status_sentence(
         return " ".join(filter(None, [detail, remedy, found, *_failures(entries)]))
     limit = binding(problem, best)
     label = limit[0].label if limit else "the objective"
+    further = "raise the budget" if ending in ENDED_EARLY else "try another method, seed or start"
     found = (
         f"No feasible design in {count} evaluations; the closest misses {label} (violation "
-        f"{best.evaluation.violation:.3g}). Widen the ranges, relax {label} or raise the budget."
+        f"{best.evaluation.violation:.3g}). Widen the ranges, relax {label} or {further}."
     )
     told = [detail, remedy if ending == "interrupted" else "", found, *_failures(entries)]
     return " ".join(filter(None, told))

@@ -14,7 +14,7 @@ from tpm_design.certificates.document import FILE as CERTIFICATE
 from tpm_design.certificates.document import document, write_document
 from tpm_design.certificates.verdict import Verdict
 from tpm_design.digests import text_sha256
-from tpm_design.errors import UsageError, did_you_mean
+from tpm_design.errors import RefusedError, UsageError, did_you_mean
 from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.problem import Design
@@ -30,6 +30,7 @@ from tpm_design.runs.replay import answers_in
 from tpm_design.runs.rounds import Proving, search_certified
 from tpm_design.runs.tables import EvaluationTable, csv_line
 from tpm_design.study.design import completed_design, tied_error
+from tpm_design.study.document import where
 from tpm_design.study.plain import dump_yaml
 from tpm_design.study.resuming import check_resumable
 
@@ -75,6 +76,15 @@ def plan_of(study: Study) -> SearchPlan:
     return SearchPlan(settings.method, settings.budget, settings.seed, settings.polish)
 
 
+def check_search(study: Study) -> None:
+    """Refuse a method that cannot search the study, where the file names it. Raises RefusedError."""
+    try:
+        check_plan(study.problem, plan_of(study))
+    except RefusedError as refused:
+        place = study.optimizer_place if study.problem.variables else where(study.path)
+        raise RefusedError(refused.what, where=place, remedy=refused.remedy) from None
+
+
 def optimize_study(
     study: Study,
     *,
@@ -91,7 +101,7 @@ def optimize_study(
     RefusedError or UsageError before anything runs, RunStoppedError where the run cannot be written.
     """
     plan = plan_of(study)
-    check_plan(study.problem, plan)
+    check_search(study)
     if resume is not None:
         check_resumable(study, resume)
     folder = resume

@@ -77,6 +77,12 @@ class GoalReader:
         elif isinstance(entry, ConstraintModel):
             minimum = None if entry.min is None else self._units.to_si(entry.min, unit)
             maximum = None if entry.max is None else self._units.to_si(entry.max, unit)
+            if minimum is not None and minimum > metric.greatest:
+                self._faults.add(
+                    (*place, "min"),
+                    f"{metric.name} is never above {metric.greatest:g}: min {entry.min:g} cannot be met",
+                    f"Choose min up to {metric.greatest:g}.",
+                )
             written |= {"min": entry.min, "max": entry.max}
         written |= options
         in_si = {option.name: self._in_si(option, options[option.name]) for option in metric.options}

@@ -12,7 +12,7 @@ from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.optimizers import default_method
 from tpm_design.optimizers.base import Optimizer
 from tpm_design.problem import Accuracy, Problem, Variable
-from tpm_design.study.document import Document, read_document
+from tpm_design.study.document import Document, read_document, where
 from tpm_design.study.faults import Faults, shown
 from tpm_design.study.form import parse
 from tpm_design.study.goals import GoalReader
@@ -145,6 +145,7 @@ def resolve(document: Document, model: StudyModel, known: Registries, *, allow_c
     }
     return Study(
         path=document.path,
+        optimizer_place=where(document.path, document.line(("optimizer", "method"))),
         name=model.name,
         units=units,
         problem=problem,

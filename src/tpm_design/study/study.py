@@ -45,11 +45,12 @@ class Study:
     """A validated study. ``problem`` is in SI units; ``resolved()`` in the study's own.
 
     ``certification``: None where the study asks for no proof. ``plug_in``: the mechanism's own file, None
-    where the mechanism is one that is registered. Studies that ask the same are equal, wherever
-    their files lie.
+    where the mechanism is one that is registered. ``optimizer_place``: file and line that name the method.
+    Studies that ask the same are equal, wherever their files lie.
     """
 
     path: Path = field(compare=False)
+    optimizer_place: str = field(compare=False)
     name: str
     units: Units
     problem: Problem
