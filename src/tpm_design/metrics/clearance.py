@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from tpm_design.metrics.following import (
     span_measurement,
 )
 from tpm_design.workspace.indices import CLEARANCE, LEGS, SERIAL, Index
+from tpm_design.workspace.loci import LocusDistance
 from tpm_design.workspace.locus_motion import LocusMotion, locus_motion
 
 CROSSED = 1e-6
@@ -37,15 +40,31 @@ def _locus_distance(name: str) -> Callable[[Context, Mapping[str, Any]], Measure
         found = context.locus_distance(part)
         if found.pose is None:
             return replace(span_measurement(context, context.size), notes={"locus": "none"})
-        motion = locus_motion(context.mechanism, context.mode, context.placed, part, found)
         here = Measurement(found.value, found.error, notes={"locus": name})
-        return here if motion is None else replace(here, near=_follows(here, motion))
+        return replace(here, near=_MovingLocus(here, context, part, found).near)
 
     return compute
 
 
-def _follows(here: Measurement, motion: LocusMotion) -> Callable[[Context], Measurement]:
-    return lambda neighbour: replace(here, value=motion.distance(neighbour.mechanism, neighbour.placed))
+@dataclass(frozen=True)
+class _MovingLocus:
+    """The distance to a locus, ``here`` as it was ``found``, for neighbouring designs. How the locus moves is
+    found when one first asks."""
+
+    here: Measurement
+    context: Context
+    part: int
+    found: LocusDistance
+
+    @cached_property
+    def _motion(self) -> LocusMotion | None:
+        own = self.context
+        return locus_motion(own.mechanism, own.mode, own.placed, self.part, self.found)
+
+    def near(self, neighbour: Context) -> Measurement:
+        if self._motion is None:
+            return replace(self.here, value=math.nan)
+        return replace(self.here, value=self._motion.distance(neighbour.mechanism, neighbour.placed))
 
 
 def _boundary_distance(context: Context, options: Mapping[str, Any]) -> Measurement:
