@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -166,8 +167,8 @@ class MechanismKind:
 
     def centre(self, design: Mapping[str, float | str]) -> tuple[float, float, float]:
         """Coordinates of a region's centre: its lengths, and 0 for every angle."""
-        names = [f"center_{name}" for name in self.pose]
-        x, y, z = (float(design[name]) if name in self.centre_names else 0.0 for name in names)
+        names, lengths = [f"center_{name}" for name in self.pose], self.centre_names
+        x, y, z = (float(design[name]) if name in lengths else 0.0 for name in names)
         return x, y, z
 
     def guard(self, drive: str) -> str:
@@ -176,11 +177,15 @@ class MechanismKind:
 
     def parameter(self, name: str) -> Parameter | None:
         """The parameter that ``name`` sets (``f`` or ``f2``), or None."""
-        for parameter in self.parameters:
-            limbs = [f"{parameter.name}{i + 1}" for i in range(self.limb_count)] if parameter.per_limb else []
-            if name == parameter.name or name in limbs:
-                return parameter
-        return None
+        return self._by_name.get(name)
+
+    @cached_property
+    def _by_name(self) -> Mapping[str, Parameter]:
+        found: dict[str, Parameter] = {}
+        for parameter in reversed(self.parameters):
+            limbs = range(self.limb_count if parameter.per_limb else 0)
+            found |= dict.fromkeys((parameter.name, *(f"{parameter.name}{i + 1}" for i in limbs)), parameter)
+        return found
 
     def parameter_names(self) -> list[str]:
         """Every name a study may use, the common ones first."""

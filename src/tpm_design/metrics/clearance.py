@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,10 +21,14 @@ from tpm_design.metrics.following import (
     span_measurement,
 )
 from tpm_design.workspace.indices import CLEARANCE, LEGS, SERIAL, Index
+from tpm_design.workspace.loci import LocusDistance
 from tpm_design.workspace.locus_motion import LocusMotion, locus_motion
 
 CROSSED = 1e-6
 """Distance between the middles of links, as a share of the machine's radius, up to which they cross."""
+
+SAME_END = 1e-5
+"""Distance between the ends of slides, as a share of the machine's radius, up to which they move alike."""
 
 SEARCH = "search along the region's normals, then sliding along the locus, ARCHITECTURE.md"
 
@@ -37,15 +43,50 @@ def _locus_distance(name: str) -> Callable[[Context, Mapping[str, Any]], Measure
         found = context.locus_distance(part)
         if found.pose is None:
             return replace(span_measurement(context, context.size), notes={"locus": "none"})
-        motion = locus_motion(context.mechanism, context.mode, context.placed, part, found)
-        here = Measurement(found.value, found.error, notes={"locus": name})
-        return here if motion is None else replace(here, near=_follows(here, motion))
+        here = Measurement(found.value, found.error, notes={"locus": name}, pieces=found.pieces)
+        return replace(here, near=_MovingLocus(here, context, part, found).near)
 
     return compute
 
 
-def _follows(here: Measurement, motion: LocusMotion) -> Callable[[Context], Measurement]:
-    return lambda neighbour: replace(here, value=motion.distance(neighbour.mechanism, neighbour.placed))
+@dataclass(frozen=True)
+class _MovingLocus:
+    """The distance to a locus, ``here`` as it was ``found``, for neighbouring designs. How the locus moves is
+    found when one first asks."""
+
+    here: Measurement
+    context: Context
+    part: int
+    found: LocusDistance
+
+    @cached_property
+    def _motions(self) -> tuple[LocusMotion, ...]:
+        """Of all pieces; none where the least has no slope."""
+        least = self._motion(self.found.value, self.found.pose)
+        if least is None or self.found.pose is None:
+            return ()
+        near = SAME_END * self.context.mechanism.reach_radius()
+        ends, motions = [self.found.pose], [least]
+        for value, pose in zip(self.found.pieces, self.found.piece_poses, strict=True):
+            twin = next(
+                (m for end, m in zip(ends, motions, strict=True) if math.dist(end, pose) < near), None
+            )
+            # a piece without a slope of its own goes with the least
+            motion = twin or self._motion(value, pose) or least
+            ends.append(pose)
+            motions.append(replace(motion, value=value))
+        return tuple(motions[1:])
+
+    def _motion(self, value: float, pose: tuple[float, float, float] | None) -> LocusMotion | None:
+        own = self.context
+        end = LocusDistance(value, self.found.error, pose)
+        return locus_motion(own.mechanism, own.mode, own.placed, self.part, end)
+
+    def near(self, neighbour: Context) -> Measurement:
+        if not self._motions:
+            return replace(self.here, value=math.nan, pieces=())
+        values = tuple(motion.distance(neighbour.mechanism, neighbour.placed) for motion in self._motions)
+        return replace(self.here, value=min(values), pieces=values)
 
 
 def _boundary_distance(context: Context, options: Mapping[str, Any]) -> Measurement:

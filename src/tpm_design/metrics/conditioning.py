@@ -95,12 +95,13 @@ def _mean(context: Context, options: Mapping[str, Any]) -> Measurement:
     if options["over"] == "region" and context.placed.form == POINTS:
         return replace(_mean_at_points(options, context), near=partial(_mean_at_points, options))
     fields = _fields(context, options)
+    found = _averages(context, options, fields)
     fine, coarse = (
         _share_of(options, each.conditioning, each.volume, field)
-        for each, field in zip(_averages(context, options, fields), fields, strict=True)
+        for each, field in zip(found, fields, strict=True)
     )
     moving = _moving(context, options)
-    near = None if moving is None else MovingConditioning(moving, options).mean_near
+    near = None if moving is None else MovingConditioning(moving, options, found).mean_near
     return Measurement(fine, abs(fine - coarse), near=near)
 
 
@@ -118,17 +119,18 @@ def _share(context: Context, options: Mapping[str, Any]) -> Measurement:
         _share_of(options, each.above, each.volume, field) for each, field in zip(found, fields, strict=True)
     )
     moving = _moving(context, options)
-    near = None if moving is None else MovingConditioning(moving, options).share_near
+    near = None if moving is None else MovingConditioning(moving, options, found).share_near
     return Measurement(fine, abs(fine - coarse), near=near)
 
 
 @dataclass(frozen=True)
 class MovingConditioning:
-    """1/κ in the ``moving`` fields of a design, for its neighbours. Singular vectors, and where 1/κ passes
-    the threshold, are found when one first asks."""
+    """1/κ in the ``moving`` fields of a design, for its neighbours. Singular vectors, and how 1/κ goes where
+    it passes the threshold, are found when one first asks."""
 
     moving: MovingFields
     options: Mapping[str, Any]
+    averages: tuple[Averages, Averages]
 
     @cached_property
     def _means(self) -> tuple[MovingMean, ...]:
@@ -144,23 +146,13 @@ class MovingConditioning:
     def _levels(self) -> tuple[MovingLevel, ...]:
         machine, mode = self.moving.mechanism, self.moving.mode
         frobenius, motor = self.options["norm"] == "frobenius", machine.motor_weight(self.options["drive"])
-        nodes = GAUSS_NODES[self.options["over"]]
-        threshold = self.options["threshold"]
         return tuple(
-            moving_level(
-                machine,
-                mode,
-                boundary.field,
-                frobenius=frobenius,
-                motor=motor,
-                threshold=threshold,
-                nodes=count,
-            )
-            for boundary, count in zip(self.moving.boundaries, nodes, strict=True)
+            moving_level(machine, mode, boundary.field, found.crossings, frobenius=frobenius, motor=motor)
+            for boundary, found in zip(self.moving.boundaries, self.averages, strict=True)
         )
 
     def mean_near(self, neighbour: Context) -> Measurement:
-        fields = self.moving.near(neighbour)
+        fields = neighbour.moved(self.moving)
         return self._shares(
             fields,
             [
@@ -170,7 +162,7 @@ class MovingConditioning:
         )
 
     def share_near(self, neighbour: Context) -> Measurement:
-        fields = self.moving.near(neighbour)
+        fields = neighbour.moved(self.moving)
         return self._shares(
             fields,
             [
@@ -193,12 +185,7 @@ def _fields(context: Context, options: Mapping[str, Any]) -> tuple[RayField, Ray
 
 def _moving(context: Context, options: Mapping[str, Any]) -> MovingFields | None:
     """The fields that integrals are taken over, ready to be moved; None where one of them is empty."""
-    fields = _fields(context, options)
-    of_region = options["over"] == "region"
-    fine, coarse = (None if of_region else field.largest() for field in fields)
-    if not all(field.volumes.size for field in fields):
-        return None
-    return MovingFields(context.mechanism, context.mode, fields, (fine, coarse), 0.0, of_region)
+    return context.moving_aspects if options["over"] == "aspect" else context.moving_region_aspects
 
 
 def _share_of(options: Mapping[str, Any], integral: float, volume: float, field: RayField) -> float:

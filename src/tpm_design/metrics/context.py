@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.metrics.moving_fields import MovingFields
 from tpm_design.workspace.aspects import RayField, locate, located, mode_fields, region_fields
 from tpm_design.workspace.extremes import Extreme, extremes_over_region
 from tpm_design.workspace.fold_clearance import fold_clearance
@@ -202,6 +203,32 @@ class Context:
         """Ray fields of the region's parts in each aspect, fine and coarse."""
         order = max(3, (rays_for(self.volume_rtol) + 1) // 3)
         return region_fields(self.mechanism, self.mode, self.placed, orders=(order, order - 1))
+
+    @cached_property
+    def moving_aspects(self) -> MovingFields | None:
+        """The largest aspect by each of ``aspects``, ready to be moved; None where one found none."""
+        fine, coarse = (field.largest() for field in self.aspects)
+        if fine is None or coarse is None:
+            return None
+        return MovingFields(self.mechanism, self.mode, self.aspects, (fine, coarse), 0.0)
+
+    @cached_property
+    def moving_region_aspects(self) -> MovingFields | None:
+        """``region_aspects``, ready to be moved; None where one of them is empty."""
+        fields = self.region_aspects
+        if not all(field.volumes.size for field in fields):
+            return None
+        return MovingFields(self.mechanism, self.mode, fields, (None, None), 0.0, of_region=True)
+
+    @cached_property
+    def _moved(self) -> dict[MovingFields, tuple[RayField, RayField]]:
+        return {}
+
+    def moved(self, moving: MovingFields) -> tuple[RayField, RayField]:
+        """Fields of a design next to this one as this one has them, to first order."""
+        if moving not in self._moved:
+            self._moved[moving] = moving.near(self.mechanism, self.region)
+        return self._moved[moving]
 
     def aspect_of(self, field: RayField, pose: tuple[float, float, float]) -> int | None:
         """Component of ``field`` that holds ``pose``."""

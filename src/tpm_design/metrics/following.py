@@ -7,6 +7,7 @@ fixed (J. M. Danskin, The theory of max-min, 1966). Poses move with the region's
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +53,12 @@ def sides_of(context: Context) -> Values:
     if context.reachable:
         return lambda other: signs[:, None] * values(other)
     here = np.array([side.pieces for side in sides])
-    cornered = _cornered(context, indices, poses)
-    return lambda other: np.where(cornered, here, signs[:, None] * values(other))
+
+    @cache
+    def cornered() -> NDArray[np.bool_]:
+        return _cornered(context, indices, poses)
+
+    return lambda other: np.where(cornered(), here, signs[:, None] * values(other))
 
 
 def _cornered(context: Context, indices: Sequence[Index], poses: NDArray[np.float64]) -> NDArray[np.bool_]:

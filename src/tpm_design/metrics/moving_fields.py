@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
-from tpm_design.metrics.context import Context
 from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.moving_boundary import (
     MovingBoundary,
@@ -14,9 +13,10 @@ from tpm_design.workspace.moving_boundary import (
     mode_field_near,
     moving_boundary,
 )
+from tpm_design.workspace.region_geometry import PlacedRegion
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MovingFields:
     """A fine and a coarse ray field of a design, of each one connected set (its index in ``components``) or
     all (None). ``floor``: as they were traced with, None where reach alone was looked at. ``of_region``: rays
@@ -38,11 +38,9 @@ class MovingFields:
             for field, component in zip(self.fields, self.components, strict=True)
         )
 
-    def near(self, neighbour: Context) -> tuple[RayField, RayField]:
-        """The fields of a neighbouring design, to first order."""
-        machine = neighbour.mechanism
-        if self.of_region:
-            region = neighbour.placed
+    def near(self, machine: Mechanism, region: PlacedRegion | None) -> tuple[RayField, RayField]:
+        """The fields of a neighbouring design, to first order. Metrics ask its ``Context.moved``."""
+        if self.of_region and region is not None:
             fine, coarse = (field_near(b, machine, region.centre, region.half) for b in self.boundaries)
         else:
             fine, coarse = (mode_field_near(b, machine) for b in self.boundaries)

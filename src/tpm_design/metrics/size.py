@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tpm_design.metrics.base import Measurement, Metric, Option
 from tpm_design.metrics.context import Context
 from tpm_design.metrics.following import span_measurement
 from tpm_design.metrics.moving_fields import MovingFields
-from tpm_design.workspace.aspects import RayField
-from tpm_design.workspace.extents import field_extent
+from tpm_design.workspace.extents import extent_of_segments, field_extent, outermost_segments
 from tpm_design.workspace.indices import ACTUATOR, Index
 
 OVER = Option("over", "choice", "poses considered", default="region", choices=("region", "aspect"))
@@ -35,25 +37,41 @@ def _robot_size(context: Context, options: Mapping[str, Any]) -> Measurement:
 
 
 def _size_over_aspect(context: Context) -> Measurement:
-    one, other = (field.largest() for field in context.aspects)
-    if one is None:
-        return Measurement.undefined("the mode has no reachable pose")
-    measured = _extent(context, context.aspects)
-    if other is None:
-        return measured
-    moving = MovingFields(context.mechanism, context.mode, context.aspects, (one, other), 0.0)
-    return replace(measured, near=partial(_extent_near, moving))
-
-
-def _extent(context: Context, fields: tuple[RayField, RayField]) -> Measurement:
-    fine, coarse = (field_extent(context.mechanism.geometry, context.mode.signs, field) for field in fields)
+    geometry, signs = context.mechanism.geometry, context.mode.signs
+    fine, coarse = (field_extent(geometry, signs, field) for field in context.aspects)
     if fine is None:
-        raise ValueError("the fine field is empty")
-    return Measurement(fine, abs(fine - coarse) if coarse is not None else fine)
+        return Measurement.undefined("the mode has no reachable pose")
+    if coarse is None or context.moving_aspects is None:
+        return Measurement(fine, fine)
+    return replace(_extent(fine, coarse), near=_MovingExtent(context.moving_aspects).near)
 
 
-def _extent_near(moving: MovingFields, neighbour: Context) -> Measurement:
-    return _extent(neighbour, moving.near(neighbour))
+def _extent(fine: float, coarse: float) -> Measurement:
+    return Measurement(fine, abs(fine - coarse))
+
+
+@dataclass(frozen=True)
+class _MovingExtent:
+    """The bounding boxes of ``moving`` fields for neighbouring designs: by the segments that touch them,
+    which are found when a neighbour first asks."""
+
+    moving: MovingFields
+
+    @cached_property
+    def _outermost(self) -> tuple[NDArray[np.intp], ...]:
+        machine, mode = self.moving.mechanism, self.moving.mode
+        return tuple(
+            outermost_segments(machine.geometry, mode.signs, b.field) for b in self.moving.boundaries
+        )
+
+    def near(self, neighbour: Context) -> Measurement:
+        geometry, signs = neighbour.mechanism.geometry, neighbour.mode.signs
+        return _extent(
+            *(
+                extent_of_segments(geometry, signs, field, segments)
+                for field, segments in zip(neighbour.moved(self.moving), self._outermost, strict=True)
+            )
+        )
 
 
 def _actuator_range(context: Context, options: Mapping[str, Any]) -> Measurement:

@@ -42,13 +42,15 @@ def _singularity_free_volume(context: Context, options: Mapping[str, Any]) -> Me
     )
     near = None
     if one is not None and other is not None:
-        moving = MovingFields(context.mechanism, context.mode, fields, (one, other), margin)
+        moving = context.moving_aspects if margin == 0.0 and home is None else None
+        if moving is None:
+            moving = MovingFields(context.mechanism, context.mode, fields, (one, other), margin)
         near = partial(_volume_near, moving)
     return Measurement(fine, abs(fine - coarse), near=near)
 
 
 def _volume_near(moving: MovingFields, neighbour: Context) -> Measurement:
-    fine, coarse = (float(np.sum(field.volumes)) for field in moving.near(neighbour))
+    fine, coarse = (float(np.sum(field.volumes)) for field in neighbour.moved(moving))
     return Measurement(fine, abs(fine - coarse))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +19,28 @@ from tpm_design.workspace.rays import MOST_STEPS, next_share
 GAUSS_NODES = {"region": (8, 6), "aspect": (16, 12)}
 
 
+class Crossings(NamedTuple):
+    """Of S segments: whether 1/κ is above the threshold where they begin and end (S,). Of the K places where
+    it passes the threshold: the index ``segment`` (K,) among these, ray parameter ``t`` (K,), and ``sign``
+    (K,) +1 where a part above ends, −1 where one begins."""
+
+    begins_above: NDArray[np.bool_]
+    ends_above: NDArray[np.bool_]
+    segment: NDArray[np.int64]
+    t: NDArray[np.float64]
+    sign: NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class Averages:
-    """Integrals over the chosen segments (m³): of 1, of 1/κ, of [1/κ ≥ threshold]; least 1/κ met."""
+    """Integrals over the chosen segments (m³): of 1, of 1/κ, of [1/κ ≥ threshold]; least 1/κ met; where it
+    passes the threshold."""
 
     volume: float
     conditioning: float
     above: float
     least: float
+    crossings: Crossings
 
 
 @inner
@@ -61,7 +75,9 @@ def _crossing(geometry, mode, frobenius, motor, threshold, origin, step, a, b, f
 
 
 @inner
-def scanned(geometry, mode, frobenius, motor, threshold, origin, step, start, end, places, values, crossings):  # type: ignore[no-untyped-def]
+def _scanned(  # type: ignore[no-untyped-def]
+    geometry, mode, frobenius, motor, threshold, origin, step, start, end, places, values, crossings
+):
     """Write 1/κ just inside the start of a segment, at the places along it and just inside its end (P + 2),
     and the ray parameters between these where it passes the threshold (up to P + 1), in order; how many."""
     length = end - start
@@ -92,17 +108,22 @@ def step_of(scale, direction):  # type: ignore[no-untyped-def]
 
 @inner
 def _integrate(geometry, mode, frobenius, motor, threshold, origin, scale, field, nodes):  # type: ignore[no-untyped-def]
-    """Integrals of ``Averages`` over all segments of a field of the component wanted, −1: of all."""
+    """Integrals of ``Averages`` over all segments of a field of the component wanted, −1: of all; and the
+    members of ``Crossings``."""
     directions, weights, rays, starts, ends, component, wanted = field
     places, shares = nodes
     values, crossings = np.empty(places.size + 2), np.empty(places.size + 1)
     volume, total, above, least = 0.0, 0.0, 0.0, math.inf
+    begins_above, ends_above = np.empty(rays.size, np.bool_), np.empty(rays.size, np.bool_)
+    most = rays.size * crossings.size
+    segment, t_passed, sign = np.empty(most, np.int64), np.empty(most), np.empty(most)
+    chosen, passed = 0, 0
     for s in range(rays.size):
         if wanted >= 0 and component[s] != wanted:
             continue
         ray, start, end = rays[s], starts[s], ends[s]
         step = step_of(scale, directions[ray])
-        count = scanned(
+        count = _scanned(
             geometry, mode, frobenius, motor, threshold, origin, step, start, end, places, values, crossings
         )
         for value in values:
@@ -115,12 +136,19 @@ def _integrate(geometry, mode, frobenius, motor, threshold, origin, scale, field
         volume += weights[ray] * (end**3 - start**3) / 3.0
         # ∫ t² dt over the parts above the threshold: + t³/3 where one ends, − t³/3 where one begins
         is_above = values[0] >= threshold
+        begins_above[chosen] = is_above
         part = -(start**3) if is_above else 0.0
         for k in range(count):
+            segment[passed], t_passed[passed] = chosen, crossings[k]
+            sign[passed] = 1.0 if is_above else -1.0
+            passed += 1
             part += crossings[k] ** 3 if is_above else -(crossings[k] ** 3)
             is_above = not is_above
+        ends_above[chosen] = is_above
+        chosen += 1
         above += weights[ray] * (part + (end**3 if is_above else 0.0)) / 3.0
-    return volume, total, above, least
+    found = begins_above[:chosen], ends_above[:chosen], segment[:passed], t_passed[:passed], sign[:passed]
+    return volume, total, above, least, found
 
 
 @kernel
@@ -171,8 +199,10 @@ def conditioning_averages(
     )
     cell = float(abs(np.prod(fields[0].scale)))
     fine, coarse = (
-        Averages(cell * volume, cell * total, cell * above, least if volume > 0.0 else 0.0)
-        for volume, total, above, least in found
+        Averages(
+            cell * volume, cell * total, cell * above, least if volume > 0.0 else 0.0, Crossings(*crossings)
+        )
+        for volume, total, above, least, crossings in found
     )
     return fine, coarse
 
