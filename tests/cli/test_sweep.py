@@ -118,6 +118,7 @@ def test_a_sweep_has_a_row_for_every_point_of_its_plan(whole: tuple[Outcome, Pat
     assert (summary["best_id"], summary["feasible"]) == (int(best["id"]), True)
     length = float(best["total_link_length [mm]"])
     assert f"Best feasible design: point {best['id']}, total_link_length {length:.6g} mm" in outcome.output
+    assert "No point is feasible" not in outcome.output
     stored = json.loads(tpm_design("evaluate", run, "--json").output)
     assert stored["design"]["r"]["value"] == float(best["r [mm]"])
 
@@ -354,3 +355,13 @@ def test_a_mechanisms_own_file_that_breaks_at_some_points_ends_after_the_rows_ar
     assert "no such link" in done.stderr
     rows = rows_of(tmp_path / data["run"] / "evaluations.csv")
     assert [row["status"] for row in rows] == ["feasible"] * 5 + ["failed"] * 2
+
+
+def test_a_sweep_without_a_feasible_point_names_what_the_closest_misses(tmp_path: Path) -> None:
+    assert "conditioning_min, min: 0.2" in STUDY
+    text = STUDY.replace("conditioning_min, min: 0.2", "conditioning_min, min: 0.99")
+    study = written(tmp_path, f"{text}sweep: {{type: list, points: [{{f: 250, r: 250}}]}}\n")
+    outcome = tpm_design("sweep", study, "--output", tmp_path / "results")
+    assert outcome.code == 0
+    assert "No point is feasible; the closest, point 0, misses " in outcome.output
+    assert "conditioning_min" in outcome.output.split("misses ")[1]

@@ -126,6 +126,13 @@ def _text(study: Study, run: SweepRun, shard: Shard) -> str:
             for unit in (goal_unit(problem, goal),)
         )
         lines.insert(1, f"Best feasible design: point {run.best.number}{''.join(reached)}.")
+    elif run.best is not None and run.best.evaluation.status == "infeasible":
+        missed = [label for label, slack in run.best.evaluation.slacks.items() if slack < 0.0]
+        lines.insert(
+            1,
+            f"No point is feasible; the closest, point {run.best.number}, misses {', '.join(missed)}. "
+            "What is held may lie badly: choose it in the study, or sweep it too.",
+        )
     return "\n\n".join([*parts, "\n".join(lines)])
 
 
