@@ -258,3 +258,12 @@ def test_metrics_scale_with_the_machine(centre: tuple[float, float, float], f: f
         else:
             expected = one.metrics[name] * factor**power
             assert two.metrics[name] == pytest.approx(expected, rel=1e-6, abs=1e-9), name
+
+
+def test_a_pole_of_a_determinant_hides_no_other_shortfall() -> None:
+    """det W of a 3-URU is unbounded on lines that this cube is about."""
+    asked = problem(Box((0.07, 0.07, 0.07)), goal("coverage", minimum=1.0))
+    design = {"db": 0.1, "dp": 0.06, "f": 0.10178, "r": 0.13423, "k": 1.0, "mode": "+++ +++"}
+    found = evaluate(asked, {**design, "center_x": 0.0, "center_y": 0.01591, "center_z": 0.0})
+    assert found.status == "infeasible"
+    assert 1.0 < found.violation < 20.0

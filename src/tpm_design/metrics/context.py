@@ -24,6 +24,9 @@ from tpm_design.workspace.volume import coarser, rays_for
 FEELERS_PER_SAMPLE = 0.8
 SURVEY_RAYS_PER_SAMPLE = 1.4
 
+POLE = -10.0
+"""Some determinants have poles. Beyond this no value says more, and larger ones would hide other shortfalls."""
+
 
 @dataclass(frozen=True)
 class Sides:
@@ -127,14 +130,15 @@ class Context:
 
     @cached_property
     def sides(self) -> tuple[Sides, ...]:
-        """Every determinant over the region, in the order of the mechanism."""
+        """Every determinant over the region, in the order of the mechanism; none counts for less than
+        ``POLE``."""
         signs = self.lattice_sides
         indices = [Index(DETERMINANT, part=part, sign=sign) for part, sign in enumerate(signs)]
         return tuple(
             Sides(
-                index.sign * found.value,
+                max(index.sign * found.value, POLE),
                 found.error,
-                tuple(index.sign * piece for piece in found.pieces),
+                tuple(max(index.sign * piece, POLE) for piece in found.pieces),
                 index,
                 found,
             )

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.metrics.base import Measurement
-from tpm_design.metrics.context import Context, Sides, Span
+from tpm_design.metrics.context import POLE, Context, Sides, Span
 from tpm_design.workspace.extremes import Extreme, values_at_poses
 from tpm_design.workspace.fold_clearance import fold_clearance
 from tpm_design.workspace.indices import REACH, Index
@@ -50,15 +50,19 @@ def sides_of(context: Context) -> Values:
     indices = [side.index for side in sides]
     poses = np.array([side.extreme.piece_poses for side in sides])
     values = _at(context, indices, poses)
+
+    def near(other: Context) -> NDArray[np.float64]:
+        return np.asarray(np.maximum(signs[:, None] * values(other), POLE))
+
     if context.reachable:
-        return lambda other: signs[:, None] * values(other)
+        return near
     here = np.array([side.pieces for side in sides])
 
     @cache
     def cornered() -> NDArray[np.bool_]:
         return _cornered(context, indices, poses)
 
-    return lambda other: np.where(cornered(), here, signs[:, None] * values(other))
+    return lambda other: np.where(cornered(), here, near(other))
 
 
 def _cornered(context: Context, indices: Sequence[Index], poses: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -127,7 +131,7 @@ def singular(context: Context, side: Sides) -> Measurement:
     pieces = pieces_of(context, side.index, side.extreme)
 
     def near(other: Context) -> Measurement:
-        return Measurement(0.0, depth=float((side.index.sign * pieces(other)).min()))
+        return Measurement(0.0, depth=max(float((side.index.sign * pieces(other)).min()), POLE))
 
     return Measurement(0.0, depth=side.margin, near=near)
 
