@@ -161,7 +161,7 @@ def _optimizer_text(method: Optimizer) -> str:
         ["searches", "the whole space" if able.whole_space else "locally, from the initial design"],
         ["constraints", "handles them itself" if able.constraints else "by an exact penalty"],
         ["discrete parameters", "yes" if able.discrete else "no"],
-        ["follows gradients", "yes" if able.derivatives else "no"],
+        ["needs gradients of every metric", "yes" if able.derivatives else "no"],
         ["random", "yes, by the seed" if able.random else "no"],
         ["workers help", "yes" if able.batch else "no"],
         ["variables", f"{able.smallest_dimension} to {most}"],
