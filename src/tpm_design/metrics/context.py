@@ -25,7 +25,8 @@ FEELERS_PER_SAMPLE = 0.8
 SURVEY_RAYS_PER_SAMPLE = 1.4
 
 POLE = -10.0
-"""Some determinants have poles. Beyond this no value says more, and larger ones would hide other shortfalls."""
+"""Some determinants have poles. Beyond this no value says more, and larger ones would hide other
+shortfalls."""
 
 
 @dataclass(frozen=True)
