@@ -159,4 +159,6 @@ def _write(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise unwritable("This file cannot be written", error, path, "Its folder must be there.") from None
+        raise unwritable(
+            "This file cannot be written", error, path, "Its folder must exist and be writable."
+        ) from None

@@ -55,7 +55,9 @@ def init_study(name: str, mechanism: str) -> int | None:
             "This file exists already.", where=str(path), remedy="Choose another name, or remove it."
         ) from None
     except OSError as error:
-        raise unwritable("This file cannot be written", error, path, "Its folder must be there.") from None
+        raise unwritable(
+            "This file cannot be written", error, path, "Its folder must exist and be writable."
+        ) from None
     print(f"Wrote {path}. Next: tpm-design optimize {path}")
     return None
 
