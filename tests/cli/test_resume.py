@@ -23,7 +23,7 @@ import pytest
 from command_line import STUDY, command, tpm_design, written
 
 import tpm_design as tpm
-from small_studies import CERTIFIED
+from small_studies import CERTIFIED, SHORTEST
 from tpm_design.errors import UsageError
 from tpm_design.runs.folder import entry_to_json, read_run
 from tpm_design.runs.lock import FILE as LOCK
@@ -41,6 +41,9 @@ for old, new in (
 ):
     assert old in POLISHED
     POLISHED = POLISHED.replace(old, new)
+
+SLOPED = f"{SHORTEST}optimizer: {{budget: 200, seed: 1}}\n"
+"""Local searches along slopes, which are kept in the log."""
 
 ARCHITECTURES = (("a", 100), ("b", 120))
 SECONDS = "seconds [s]"
@@ -97,13 +100,24 @@ def cut(run: Path, length: int) -> None:
 
 
 @posix
-def test_a_search_killed_twenty_times_ends_as_if_it_had_not_been(whole: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("text", [POLISHED, SLOPED], ids=["polished", "multistart"])
+def test_a_search_killed_twenty_times_ends_as_if_it_had_not_been(text: str, tmp_path: Path) -> None:
+    whole = finished_run(tmp_path, text)
     program = Path(__file__).with_name("killed.py")
-    words = [sys.executable, program, written(tmp_path, POLISHED), tmp_path / "results", "20", "1"]
+    (tmp_path / "killed").mkdir()
+    words = [
+        sys.executable,
+        program,
+        written(tmp_path / "killed", text),
+        tmp_path / "killed/results",
+        "20",
+        "1",
+    ]
     subprocess.run([str(word) for word in words], check=True)
-    again = only_run(tmp_path)
+    again = only_run(tmp_path / "killed")
     assert contents(again) == contents(whole)
     assert {path.name for path in again.iterdir()} == {path.name for path in whole.iterdir()}
+    assert any("slopes" in entry for entry in contents(whole)[2]) == (text == SLOPED)
 
 
 def started(*words: str | Path, run: Callable[[], list[Path]], rows: int) -> subprocess.Popen[str]:
