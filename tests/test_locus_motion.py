@@ -13,7 +13,7 @@ from tpm_design.mechanisms import mechanism
 from tpm_design.metrics import METRICS
 from tpm_design.metrics.base import Measurement
 from tpm_design.metrics.context import Context
-from tpm_design.workspace.loci import CANDIDATES, LocusDistance
+from tpm_design.workspace.loci import LocusDistance
 from tpm_design.workspace.locus_motion import LocusMotion, locus_motion
 from tpm_design.workspace.region_geometry import place, signed_distance_at
 from tpm_design.workspace.region_normals import outward_normals
@@ -241,42 +241,3 @@ def test_all_nearest_faces_are_told_at_a_kink() -> None:
     flat = outward_normals(place(Ellipsoid((0.1, 0.06, 0.08)), middle), (0.02, 0.0, 0.01))
     assert np.allclose(flat[0] * (1.0, -1.0, 1.0), flat[1], atol=1e-12)
     assert outward_normals(place(Points((middle,)), middle), middle) == []
-
-
-def in_threes(centre: tuple[float, float, float]) -> Context:
-    """A 3-URU with equal limbs and a cube: centres on the diagonal have three nearest points of det W = 0."""
-    built = mechanism("uru", db=0.185, dp=0.06, f=0.23, r=0.176, k=1.0)
-    mode = built.mode_of({"octant": "+++", "elbows": "+++"})
-    return Context(built, mode, place(Box((0.2, 0.2, 0.2)), centre), 1e-3, 9)
-
-
-def test_at_a_tie_the_nearest_of_all_points_is_followed() -> None:
-    """The distance falls to whichever point comes nearest: its slope is another one for each direction."""
-    centre = np.full(3, 0.1548)
-    own = in_threes((0.1548, 0.1548, 0.1548))
-    here = measured(own, "actuation")
-    assert here.near is not None
-    random = np.random.default_rng(3)
-    distances = []
-    for way in random.normal(size=(8, 3)):
-        x, y, z = centre + STEP * way
-        there = in_threes((x, y, z))
-        change = here.near(there).value - here.value
-        assert change == pytest.approx(measured(there, "actuation").value - here.value, abs=0.02 * STEP)
-        distances.append(here.near(there).pieces)
-    assert len(set(np.argmin(distances, axis=1).tolist())) > 1
-
-
-def test_pieces_are_points_of_the_locus_and_their_least_is_the_distance() -> None:
-    random = np.random.default_rng(4)
-    for centre in random.uniform(0.14, 0.17, (6, 3)):
-        x, y, z = centre
-        own = in_threes((x, y, z))
-        for part in range(3):
-            found = own.locus_distance(part)
-            assert len(found.pieces) == len(found.piece_poses) == CANDIDATES
-            assert min(found.pieces) == found.value
-            poses = np.array(found.piece_poses)
-            assert np.abs(own.mechanism.determinants_at(poses, own.mode)[part]).max() < 1e-9
-            for value, pose in zip(found.pieces, found.piece_poses, strict=True):
-                assert signed_distance_at(own.placed, pose) == pytest.approx(value, abs=1e-12)

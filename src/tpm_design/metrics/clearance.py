@@ -27,9 +27,6 @@ from tpm_design.workspace.locus_motion import LocusMotion, locus_motion
 CROSSED = 1e-6
 """Distance between the middles of links, as a share of the machine's radius, up to which they cross."""
 
-SAME_END = 1e-5
-"""Distance between the ends of slides, as a share of the machine's radius, up to which they move alike."""
-
 SEARCH = "search along the region's normals, then sliding along the locus, ARCHITECTURE.md"
 
 
@@ -43,7 +40,7 @@ def _locus_distance(name: str) -> Callable[[Context, Mapping[str, Any]], Measure
         found = context.locus_distance(part)
         if found.pose is None:
             return replace(span_measurement(context, context.size), notes={"locus": "none"})
-        here = Measurement(found.value, found.error, notes={"locus": name}, pieces=found.pieces)
+        here = Measurement(found.value, found.error, notes={"locus": name})
         return replace(here, near=_MovingLocus(here, context, part, found).near)
 
     return compute
@@ -60,33 +57,14 @@ class _MovingLocus:
     found: LocusDistance
 
     @cached_property
-    def _motions(self) -> tuple[LocusMotion, ...]:
-        """Of all pieces; none where the least has no slope."""
-        least = self._motion(self.found.value, self.found.pose)
-        if least is None or self.found.pose is None:
-            return ()
-        near = SAME_END * self.context.mechanism.reach_radius()
-        ends, motions = [self.found.pose], [least]
-        for value, pose in zip(self.found.pieces, self.found.piece_poses, strict=True):
-            twin = next(
-                (m for end, m in zip(ends, motions, strict=True) if math.dist(end, pose) < near), None
-            )
-            # a piece without a slope of its own goes with the least
-            motion = twin or self._motion(value, pose) or least
-            ends.append(pose)
-            motions.append(replace(motion, value=value))
-        return tuple(motions[1:])
-
-    def _motion(self, value: float, pose: tuple[float, float, float] | None) -> LocusMotion | None:
+    def _motion(self) -> LocusMotion | None:
         own = self.context
-        end = LocusDistance(value, self.found.error, pose)
-        return locus_motion(own.mechanism, own.mode, own.placed, self.part, end)
+        return locus_motion(own.mechanism, own.mode, own.placed, self.part, self.found)
 
     def near(self, neighbour: Context) -> Measurement:
-        if not self._motions:
-            return replace(self.here, value=math.nan, pieces=())
-        values = tuple(motion.distance(neighbour.mechanism, neighbour.placed) for motion in self._motions)
-        return replace(self.here, value=min(values), pieces=values)
+        if self._motion is None:
+            return replace(self.here, value=math.nan)
+        return replace(self.here, value=self._motion.distance(neighbour.mechanism, neighbour.placed))
 
 
 def _boundary_distance(context: Context, options: Mapping[str, Any]) -> Measurement:

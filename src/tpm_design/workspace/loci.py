@@ -41,15 +41,11 @@ RIM_DIFFERENCE = 1e-5
 @dataclass(frozen=True)
 class LocusDistance:
     """``value`` (m): distance, or minus the penetration depth. ``error`` (m). ``pose``: the locus point,
-    None if no locus was met within reach (``value`` is then +inf). ``pieces`` (P,): distances (m) at which
-    slides ended, apart from one another, whose least is ``value``: a fixed number of them, the least again
-    where fewer slides arrived. ``piece_poses``: their locus points."""
+    None if no locus was met within reach (``value`` is then +inf)."""
 
     value: float
     error: float
     pose: tuple[float, float, float] | None
-    pieces: tuple[float, ...] = ()
-    piece_poses: tuple[tuple[float, float, float], ...] = ()
 
 
 @inner
@@ -383,9 +379,7 @@ def _slide_on_rim(geometry, mode, region, part, start, best, step, smallest):  #
 
 @inner
 def _best_slide(geometry, mode, region, part, starts, distances, stride, step, smallest):  # type: ignore[no-untyped-def]
-    """Slide from the nearest starts that lie apart: the best end, and all of them (CANDIDATES, 4), +inf where
-    fewer arrived; ``stride`` skips starts."""
-    ends = np.full((CANDIDATES, 4), math.inf)
+    """Slide from the nearest starts that lie apart; ``stride`` skips starts."""
     best, bx, by, bz = math.inf, math.nan, math.nan, math.nan
     chosen = np.full(TRIES, -1, np.int64)
     # a start that does not get onto the locus bars only what is next to it
@@ -419,12 +413,10 @@ def _best_slide(geometry, mode, region, part, starts, distances, stride, step, s
         if _nearest_bound(geometry, mode, start[0], start[1], start[2])[1] < RIM_REACH * step:
             found = _slide_on_rim(geometry, mode, region, part, start, found[0], step, smallest)
         failed[k] = not found[0] < math.inf
-        if not failed[k]:
-            ends[arrived, 0], ends[arrived, 1], ends[arrived, 2], ends[arrived, 3] = found
-            arrived += 1
+        arrived += not failed[k]
         if found[0] < best:
             best, bx, by, bz = found
-    return best, bx, by, bz, ends
+    return best, bx, by, bz
 
 
 @inner
@@ -480,8 +472,7 @@ def _starts(inside, feeler_points, feeler_normals, ways, known):  # type: ignore
 def _nearest_locus(  # type: ignore[no-untyped-def]
     geometry, mode, region, part, determinants, grid, feeler_points, feeler_normals, known, spacing, limit
 ):
-    """As ``locus_distance``: least distance and its pose (2, 4) from all starts and from half of them, and
-    the ends (CANDIDATES, 4) of all slides of the first."""
+    """As ``locus_distance``: least distance and its pose (2, 4) from all starts and from half of them."""
     inside = _lattice_crossings(determinants[part], grid)
     if known.shape[0] > 0:
         # what lies beyond a known point of the locus is not the nearest
@@ -494,10 +485,9 @@ def _nearest_locus(  # type: ignore[no-untyped-def]
     starts = _starts(inside, feeler_points, feeler_normals, ways, known)
     distances = _signed_distances(region, starts)
     found = np.empty((2, 4))
-    pieces = np.empty((CANDIDATES, 4))
     # a loop, since for each literal stride everything would be compiled by itself
     for k in range(2):
-        best, x, y, z, ends = _best_slide(
+        best, x, y, z = _best_slide(
             geometry,
             mode,
             region,
@@ -509,9 +499,7 @@ def _nearest_locus(  # type: ignore[no-untyped-def]
             FINEST_STEP * spacing,
         )
         found[k, 0], found[k, 1], found[k, 2], found[k, 3] = best, x, y, z
-        if k == 0:
-            pieces = ends
-    return found, pieces
+    return found
 
 
 def locus_distance(
@@ -534,7 +522,7 @@ def locus_distance(
     ``sampling.feelers``; ``known`` (N, 3): points of the locus found elsewhere; ``spacing`` (m) of the
     lattice; ``limit`` (m) at which feelers end at the latest.
     """
-    found, ends = _nearest_locus(
+    fine, coarse = _nearest_locus(
         geometry,
         signs,
         region,
@@ -546,20 +534,10 @@ def locus_distance(
         known,
         spacing,
         limit,
-    )
-    fine, coarse = found.tolist()
+    ).tolist()
     best = min(fine, coarse)
     if not best[0] < math.inf:
         return LocusDistance(math.inf, 0.0, None)
     both = max(fine[0], coarse[0]) < math.inf
     missed = abs(fine[0] - coarse[0]) if both else abs(best[0])
-    pieces = [end if end[0] < math.inf else best for end in ends.tolist()]
-    if best not in pieces:
-        pieces[pieces.index(min(pieces))] = best
-    return LocusDistance(
-        best[0],
-        missed + ERROR_FLOOR * spacing,
-        (best[1], best[2], best[3]),
-        tuple(distance for distance, *_ in pieces),
-        tuple((x, y, z) for _, x, y, z in pieces),
-    )
+    return LocusDistance(best[0], missed + ERROR_FLOOR * spacing, (best[1], best[2], best[3]))
