@@ -15,14 +15,32 @@ from tpm_design.workspace.regions import Points
 
 def design_context(problem: Problem, design: Design) -> Context:
     """The mechanism, mode and placed region of one design. Raises ParameterError where it cannot be."""
-    names = set(problem.kind.parameter_names())
-    values = {name: value for name, value in design.items() if name in names}
-    mechanism = problem.kind.build(values, problem.limits)
+    mechanism = problem.kind.build(_parameters(problem, design), problem.limits)
     mode = mechanism.mode_of(problem.modes[str(design["mode"])])
     region = None
     if problem.region is not None:
         region = place(problem.region, problem.kind.centre(design))
     return Context(mechanism, mode, region, problem.accuracy.volume, problem.accuracy.region_samples)
+
+
+def neighbouring_context(problem: Problem, context: Context, design: Design, neighbour: Design) -> Context:
+    """As ``design_context``, of another design in the same mode: what it has in common with ``design``, whose
+    ``context`` there is, is not made again."""
+    mechanism, region = context.mechanism, context.region
+    values = _parameters(problem, neighbour)
+    if values != _parameters(problem, design):
+        mechanism = problem.kind.build(values, problem.limits)
+    if problem.region is not None:
+        centre = problem.kind.centre(neighbour)
+        if centre != problem.kind.centre(design):
+            region = place(problem.region, centre)
+    return Context(mechanism, context.mode, region, context.volume_rtol, context.region_samples)
+
+
+def _parameters(problem: Problem, design: Design) -> dict[str, float | str]:
+    """The design without mode and place."""
+    names = problem.kind.parameter_names()
+    return {name: design[name] for name in names if name in design}
 
 
 def offset_mechanism(

@@ -46,7 +46,9 @@ def evaluate(
             if why:
                 return _judged(problem, design, measured, began, cutoff=cutoff, why=why)
         sampled = sampled_machines(problem, context, measured)
-        slopes = None if neighbours is None else slopes_along(problem, context, measured, sampled, neighbours)
+        slopes = None
+        if neighbours is not None:
+            slopes = slopes_along(problem, design, context, measured, sampled, neighbours)
     except (ParameterError, ArithmeticError) as error:
         reason = error.what if isinstance(error, ParameterError) else str(error)
         return Evaluation(

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tpm_design.errors import ParameterError
-from tpm_design.evaluation.contexts import design_context
+from tpm_design.evaluation.contexts import neighbouring_context
 from tpm_design.evaluation.goals import slack_pieces
 from tpm_design.evaluation.samples import Sampled, samples_near
 from tpm_design.metrics.base import UNDEFINED, Measurement
@@ -34,6 +34,7 @@ derivative along each neighbour's variable, SI. Missing: not known to first orde
 
 def slopes_along(
     problem: Problem,
+    design: Design,
     context: Context,
     measured: Mapping[str, Measurement],
     sampled: Sampled,
@@ -44,7 +45,8 @@ def slopes_along(
     there = []
     for neighbour in neighbours:
         try:
-            there.append(_seen_near(problem, design_context(problem, neighbour.design), measured, sampled))
+            beside = neighbouring_context(problem, context, design, neighbour.design)
+            there.append(_seen_near(problem, beside, measured, sampled))
         except ParameterError:
             return {}
     slopes = {}
