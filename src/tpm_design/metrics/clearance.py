@@ -95,18 +95,19 @@ def _margin(value: float, error: float) -> Measurement:
 def _link_clearance(context: Context, options: Mapping[str, Any]) -> Measurement:
     if not context.reachable:
         return Measurement.undefined("the region is not reachable")
-    index = Index(CLEARANCE)
-    found = context.least(index)
-    pieces = pieces_of(context, index, found)
+    found = extreme_measurement(context, Index(CLEARANCE))
+    unheld = found.near
     # links that cross are 0 apart, and so they are in every neighbouring design
     apart = np.array(found.pieces) + 2.0 * context.mechanism.geometry.link_radius
     crossed = apart < CROSSED * context.mechanism.reach_radius()
+    if unheld is None or not crossed.any():
+        return found
 
     def near(other: Context) -> Measurement:
-        values = np.where(crossed, found.pieces, pieces(other))
-        return Measurement(float(values.min()), found.error, pieces=tuple(values.tolist()))
+        pieces = np.where(crossed, found.pieces, unheld(other).pieces)
+        return replace(found, value=float(pieces.min()), pieces=tuple(pieces.tolist()))
 
-    return Measurement(found.value, found.error, pieces=found.pieces, near=near)
+    return replace(found, near=near)
 
 
 def _distance(name: str, condition: str) -> Metric:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tpm_design.metrics.base import Measurement
 from tpm_design.metrics.context import POLE, Context, Sides, Span
-from tpm_design.workspace.extremes import Extreme, values_at_poses
+from tpm_design.workspace.extremes import Extreme, IndicesNear
 from tpm_design.workspace.fold_clearance import fold_clearance
 from tpm_design.workspace.indices import REACH, Index
 
@@ -24,10 +24,13 @@ CORNER_STEP, CORNER = 1e-6, 1e-9
 Values = Callable[[Context], NDArray[np.float64]]
 """Of a neighbouring design."""
 
+Posed = tuple[Sequence[Index], NDArray[np.float64]]
+"""Indices, and the poses (K, P, 3) of each."""
+
 
 def pieces_of(context: Context, index: Index, extreme: Extreme) -> Values:
     """The pieces (P,) of one extreme."""
-    values = _at(context, (index,), extreme.piece_poses[None, :, :])
+    values = _at(context, lambda: ([index], extreme.piece_poses[None, :, :]))
     return lambda other: values(other)[0]
 
 
@@ -37,7 +40,7 @@ def reach_of(context: Context) -> Values:
 
     def near(other: Context) -> NDArray[np.float64]:
         folds = [fold_clearance(other.placed, line).value for line in other.mechanism.fold_lines()]
-        return np.concatenate([values(other), folds])
+        return np.concatenate([values(other), folds]) if folds else values(other)
 
     return near
 
@@ -46,41 +49,43 @@ def sides_of(context: Context) -> Values:
     """The pieces (D, P) of ``Context.sides``. Out of reach determinants are extrapolated, with corners where
     limbs are stretched: extremes there count as level."""
     sides = context.sides
-    signs = np.array([side.index.sign for side in sides])
-    indices = [side.index for side in sides]
-    poses = np.array([side.extreme.piece_poses for side in sides])
-    values = _at(context, indices, poses)
+    values = _at(context, lambda: _posed(sides))
+    signs = np.array([[side.index.sign] for side in sides])
 
     def near(other: Context) -> NDArray[np.float64]:
-        return np.asarray(np.maximum(signs[:, None] * values(other), POLE))
+        return np.asarray(np.maximum(signs * values(other), POLE))
 
     if context.reachable:
         return near
-    here = np.array([side.pieces for side in sides])
 
     @cache
     def cornered() -> NDArray[np.bool_]:
-        return _cornered(context, indices, poses)
+        return _cornered(context, sides)
 
-    return lambda other: np.where(cornered(), here, near(other))
+    return lambda other: np.where(cornered(), [side.pieces for side in sides], near(other))
 
 
-def _cornered(context: Context, indices: Sequence[Index], poses: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """At which of its poses (K, P, 3) each index has a corner: there second differences are larger than the
-    square of their width."""
+def _posed(sides: Sequence[Sides]) -> Posed:
+    return [side.index for side in sides], np.array([side.extreme.piece_poses for side in sides])
+
+
+def _cornered(context: Context, sides: Sequence[Sides]) -> NDArray[np.bool_]:
+    """At which of its piece poses each determinant has a corner (D, P): there second differences are larger
+    than the square of their width."""
     step = CORNER_STEP * context.mechanism.reach_radius()
     ways = step * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
+    indices, poses = _posed(sides)
     around = poses[:, :, None, :] + ways
-    shape = around.shape[:3]
-    values = _at(context, indices, around.reshape(len(indices), -1, 3))(context).reshape(shape)
-    bends = np.abs(values[:, :, 1:4] + values[:, :, 4:] - 2.0 * values[:, :, :1])
+    values = _at(context, lambda: (indices, around.reshape(len(indices), -1, 3)))(context)
+    by_way = values.reshape(around.shape[:3])
+    bends = np.abs(by_way[:, :, 1:4] + by_way[:, :, 4:] - 2.0 * by_way[:, :, :1])
     return np.asarray(bends.max(axis=2) > CORNER)
 
 
 def span_of(context: Context, span: Span) -> Callable[[Context], float]:
     """The difference between two extremes of an index."""
     ends = [span.index._replace(sign=sign) for sign in (1.0, -1.0)]
-    values = _at(context, ends, np.array([[span.least.pose], [span.greatest.pose]]))
+    values = _at(context, lambda: (ends, np.array([[span.least.pose], [span.greatest.pose]])))
 
     def near(other: Context) -> float:
         least, greatest = values(other)[:, 0].tolist()
@@ -137,16 +142,15 @@ def singular(context: Context, side: Sides) -> Measurement:
 
 
 def _of_pieces(pieces: NDArray[np.float64], found: Extreme, sign: float) -> Measurement:
-    value = float(pieces.min() if sign > 0.0 else pieces.max())
-    return Measurement(value, found.error, pieces=tuple(pieces.tolist()))
+    values = pieces.tolist()
+    return Measurement(min(values) if sign > 0.0 else max(values), found.error, pieces=tuple(values))
 
 
-def _at(context: Context, indices: Sequence[Index], poses: NDArray[np.float64]) -> Values:
-    """Each index at its own poses (K, P, 3)."""
-    offsets = poses - np.array(context.placed.centre)
+def _at(context: Context, posed: Callable[[], Posed]) -> Values:
+    """Indices, each at its own poses, which are asked for once a neighbour is."""
 
-    def near(other: Context) -> NDArray[np.float64]:
-        moved = offsets + np.array(other.placed.centre)
-        return values_at_poses(other.mechanism.geometry, other.mode.signs, indices, moved)
+    @cache
+    def ready() -> IndicesNear:
+        return IndicesNear(*posed(), context.placed.centre)
 
-    return near
+    return lambda other: ready().values(other.mechanism.geometry, other.mode.signs, other.placed.centre)

@@ -159,16 +159,15 @@ def _extremes(geometry, mode, region, indices, points, spacing):  # type: ignore
 
 
 @short_kernel
-def _at_poses(geometry, mode, indices, poses):  # type: ignore[no-untyped-def]
-    """The index of each row of ``indices`` at its poses (K, P, 3)."""
-    out = np.empty(poses.shape[:2])
+def _near(geometry, mode, indices, offsets, centre):  # type: ignore[no-untyped-def]
+    """The index of each row of ``indices`` at its poses, given (K, P, 3) from ``centre``."""
+    out = np.empty(offsets.shape[:2])
     for k in range(indices.shape[0]):
         sign = indices[k, 3]
         index = Index(int(indices[k, 0]), int(indices[k, 1]), indices[k, 2], sign)
-        for n in range(poses.shape[1]):
-            out[k, n] = sign * index_value(
-                geometry, mode, index, poses[k, n, 0], poses[k, n, 1], poses[k, n, 2]
-            )
+        for n in range(offsets.shape[1]):
+            x, y, z = offsets[k, n, 0] + centre[0], offsets[k, n, 1] + centre[1], offsets[k, n, 2] + centre[2]
+            out[k, n] = sign * index_value(geometry, mode, index, x, y, z)
     return out
 
 
@@ -184,8 +183,7 @@ def extremes_over_region(
 
     ``points`` (N, 3): the region's lattice; ``spacing`` (m) between its poses.
     """
-    table = np.array(indices, dtype=np.float64).reshape(-1, 4)
-    rows = _extremes(geometry, signs, region, table, points, spacing)
+    rows = _extremes(geometry, signs, region, _table(indices), points, spacing)
     poses = rows[:, 5 + EIGHTHS :].reshape(-1, EIGHTHS, 3)
     return tuple(
         Extreme(row[0], row[1], (row[2], row[3], row[4]), tuple(row[5 : 5 + EIGHTHS]), where)
@@ -193,9 +191,22 @@ def extremes_over_region(
     )
 
 
-def values_at_poses(
-    geometry: object, signs: object, indices: Sequence[Index], poses: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Each index at its own ``poses`` (K, P, 3): (K, P), in the index's unit."""
-    table = np.array(indices, dtype=np.float64).reshape(-1, 4)
-    return np.asarray(_at_poses(geometry, signs, table, np.ascontiguousarray(poses)))
+def _table(indices: Sequence[Index]) -> NDArray[np.float64]:
+    """As kernels take them (K, 4)."""
+    return np.array(indices, dtype=np.float64).reshape(-1, 4)
+
+
+class IndicesNear:
+    """Indices, each at poses (K, P, 3) of its own that move with a ``centre``, asked many times."""
+
+    def __init__(
+        self, indices: Sequence[Index], poses: NDArray[np.float64], centre: tuple[float, float, float]
+    ) -> None:
+        self._table = _table(indices)
+        self._offsets = np.ascontiguousarray(poses) - np.array(centre)
+
+    def values(
+        self, geometry: object, signs: object, centre: tuple[float, float, float]
+    ) -> NDArray[np.float64]:
+        """(K, P), in each index's unit, for a machine with the poses about another ``centre``."""
+        return np.asarray(_near(geometry, signs, self._table, self._offsets, centre))
