@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from tpm_design.errors import ParameterError
@@ -17,30 +17,33 @@ def design_context(problem: Problem, design: Design) -> Context:
     """The mechanism, mode and placed region of one design. Raises ParameterError where it cannot be."""
     mechanism = problem.kind.build(_parameters(problem, design), problem.limits)
     mode = mechanism.mode_of(problem.modes[str(design["mode"])])
-    region = None
-    if problem.region is not None:
-        region = place(problem.region, problem.kind.centre(design))
-    return Context(mechanism, mode, region, problem.accuracy.volume, problem.accuracy.region_samples)
+    return Context(
+        mechanism, mode, _region(problem, design), problem.accuracy.volume, problem.accuracy.region_samples
+    )
 
 
-def neighbouring_context(problem: Problem, context: Context, design: Design, neighbour: Design) -> Context:
-    """As ``design_context``, of another design in the same mode: what it has in common with ``design``, whose
-    ``context`` there is, is not made again."""
-    mechanism, region = context.mechanism, context.region
-    values = _parameters(problem, neighbour)
-    if values != _parameters(problem, design):
-        mechanism = problem.kind.build(values, problem.limits)
-    if problem.region is not None:
-        centre = problem.kind.centre(neighbour)
-        if centre != problem.kind.centre(design):
-            region = place(problem.region, centre)
-    return Context(mechanism, context.mode, region, context.volume_rtol, context.region_samples)
+def neighbouring_contexts(
+    problem: Problem, context: Context, design: Design, neighbours: Sequence[Design]
+) -> list[Context]:
+    """As ``design_context``, of other designs in the same mode: what they have in common with ``design``,
+    whose ``context`` there is, is not made again."""
+    own = _parameters(problem, design)
+    found = []
+    for neighbour in neighbours:
+        values = _parameters(problem, neighbour)
+        machine = context.mechanism if values == own else problem.kind.build(values, problem.limits)
+        region = _region(problem, neighbour)
+        found.append(Context(machine, context.mode, region, context.volume_rtol, context.region_samples))
+    return found
+
+
+def _region(problem: Problem, design: Design) -> PlacedRegion | None:
+    return None if problem.region is None else place(problem.region, problem.kind.centre(design))
 
 
 def _parameters(problem: Problem, design: Design) -> dict[str, float | str]:
     """The design without mode and place."""
-    names = problem.kind.parameter_names()
-    return {name: design[name] for name in names if name in design}
+    return {name: value for name, value in design.items() if problem.kind.parameter(name) is not None}
 
 
 def offset_mechanism(

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tpm_design.errors import ParameterError
-from tpm_design.evaluation.contexts import neighbouring_context
+from tpm_design.evaluation.contexts import neighbouring_contexts
 from tpm_design.evaluation.goals import slack_pieces
 from tpm_design.evaluation.samples import Sampled, samples_near
 from tpm_design.metrics.base import UNDEFINED, Measurement
@@ -42,13 +42,11 @@ def slopes_along(
 ) -> Slopes:
     """Difference quotients of what a design's measurements say of its neighbours."""
     here = _seen_near(problem, context, measured, sampled)
-    there = []
-    for neighbour in neighbours:
-        try:
-            beside = neighbouring_context(problem, context, design, neighbour.design)
-            there.append(_seen_near(problem, beside, measured, sampled))
-        except ParameterError:
-            return {}
+    try:
+        beside = neighbouring_contexts(problem, context, design, [n.design for n in neighbours])
+        there = [_seen_near(problem, other, measured, sampled) for other in beside]
+    except ParameterError:
+        return {}
     slopes = {}
     for label, values in here.items():
         found = [

@@ -167,8 +167,10 @@ class MechanismKind:
 
     def centre(self, design: Mapping[str, float | str]) -> tuple[float, float, float]:
         """Coordinates of a region's centre: its lengths, and 0 for every angle."""
-        names, lengths = [f"center_{name}" for name in self.pose], self.centre_names
-        x, y, z = (float(design[name]) if name in lengths else 0.0 for name in names)
+        x, y, z = (
+            float(design[f"center_{name}"]) if unit == "m" else 0.0
+            for name, unit in zip(self.pose, self.pose_units, strict=True)
+        )
         return x, y, z
 
     def guard(self, drive: str) -> str:
@@ -183,12 +185,17 @@ class MechanismKind:
     def _by_name(self) -> Mapping[str, Parameter]:
         found: dict[str, Parameter] = {}
         for parameter in reversed(self.parameters):
-            limbs = range(self.limb_count if parameter.per_limb else 0)
-            found |= dict.fromkeys((parameter.name, *(f"{parameter.name}{i + 1}" for i in limbs)), parameter)
+            found |= dict.fromkeys((parameter.name, *self.limb_names[parameter.name]), parameter)
         return found
+
+    @cached_property
+    def limb_names(self) -> Mapping[str, tuple[str, ...]]:
+        """Of each parameter the names that set one limb each; none where it is one for all limbs."""
+        return {
+            p.name: tuple(f"{p.name}{i + 1}" for i in range(self.limb_count)) if p.per_limb else ()
+            for p in self.parameters
+        }
 
     def parameter_names(self) -> list[str]:
         """Every name a study may use, the common ones first."""
-        common = [p.name for p in self.parameters]
-        single = [f"{p.name}{i + 1}" for p in self.parameters if p.per_limb for i in range(self.limb_count)]
-        return common + single
+        return [p.name for p in self.parameters] + [n for names in self.limb_names.values() for n in names]

@@ -32,32 +32,29 @@ def limb_values(
 def _values(
     kind: MechanismKind, parameter: Parameter, given: Mapping[str, float | Sequence[float]]
 ) -> tuple[float, ...]:
-    count = kind.limb_count if parameter.per_limb else 1
-    single = [f"{parameter.name}{limb + 1}" for limb in range(count)] if parameter.per_limb else []
+    count, single = kind.limb_count if parameter.per_limb else 1, kind.limb_names[parameter.name]
     named = [name for name in single if name in given]
-    if parameter.name in given:
-        if named:
-            raise ParameterError(
-                f"{kind.name}: {parameter.name!r} and {named[0]!r} are both given.",
-                remedy=f"Give {parameter.name!r} for all limbs, or {', '.join(single)} one each.",
-            )
-        value = given[parameter.name]
-        values: tuple[object, ...] = (value,) * count if isinstance(value, int | float) else tuple(value)
-        if len(values) != count:
-            raise ParameterError(
-                f"{kind.name}: {parameter.name!r} has {len(values)} values for {count} limbs."
-            )
-    elif not named and parameter.default is not None:
-        values = parameter.default
-    else:
-        missing = [name for name in (single or [parameter.name]) if name not in given]
+    if parameter.name not in given:
+        if not named and parameter.default is not None:
+            return parameter.default
+        missing = [name for name in (single or (parameter.name,)) if name not in given]
         if missing:
             raise ParameterError(
                 f"{kind.name}: no value for {missing[0] if named else parameter.name!r}.",
                 remedy=f"It is the {parameter.description}.",
             )
-        values = tuple(given[name] for name in single)
-    return tuple(checked_value(kind, parameter, value) for value in values)
+        return tuple(checked_value(kind, parameter, given[name]) for name in single)
+    if named:
+        raise ParameterError(
+            f"{kind.name}: {parameter.name!r} and {named[0]!r} are both given.",
+            remedy=f"Give {parameter.name!r} for all limbs, or {', '.join(single)} one each.",
+        )
+    value = given[parameter.name]
+    if isinstance(value, int | float):
+        return (checked_value(kind, parameter, value),) * count
+    if len(value) != count:
+        raise ParameterError(f"{kind.name}: {parameter.name!r} has {len(value)} values for {count} limbs.")
+    return tuple(checked_value(kind, parameter, each) for each in value)
 
 
 def limb_tolerances(kind: MechanismKind, tolerance: Mapping[str, float]) -> dict[str, tuple[float, ...]]:

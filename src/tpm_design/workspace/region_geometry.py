@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,17 +27,28 @@ class PlacedRegion(NamedTuple):
 
 def place(shape: Shape, centre: tuple[float, float, float]) -> PlacedRegion:
     """The region ``shape`` with its centre at ``centre`` (m)."""
-    form, half = {
-        Box: lambda s: (BOX, tuple(0.5 * edge for edge in s.size)),
-        Cylinder: lambda s: (CYLINDER, (s.radius, s.radius, 0.5 * s.height)),
-        Tilt: lambda s: (CYLINDER, (_half_tangent(s.tilt), _half_tangent(s.tilt), 0.5 * s.height)),
-        Sphere: lambda s: (ELLIPSOID, (s.radius,) * 3),
-        Ellipsoid: lambda s: (ELLIPSOID, s.semi_axes),
-        Points: lambda s: (POINTS, tuple(np.abs(np.asarray(s.points)).max(axis=0).tolist())),
-    }[type(shape)](shape)
-    points = np.asarray(shape.points if isinstance(shape, Points) else (), dtype=np.float64).reshape(-1, 3)
-    at = (float(centre[0]), float(centre[1]), float(centre[2]))
-    return PlacedRegion(form, at, (float(half[0]), float(half[1]), float(half[2])), points + np.asarray(at))
+    points = np.empty((0, 3))
+    if isinstance(shape, Points):
+        points = np.asarray(shape.points, dtype=np.float64).reshape(-1, 3)
+    form, (a, b, c) = _form_and_half(shape, points)
+    x, y, z = centre
+    at = float(x), float(y), float(z)
+    return PlacedRegion(form, at, (float(a), float(b), float(c)), points + np.array(at))
+
+
+def _form_and_half(shape: Shape, points: NDArray[np.float64]) -> tuple[int, Sequence[float]]:
+    if isinstance(shape, Box):
+        return BOX, [0.5 * edge for edge in shape.size]
+    if isinstance(shape, Cylinder):
+        return CYLINDER, (shape.radius, shape.radius, 0.5 * shape.height)
+    if isinstance(shape, Tilt):
+        tangent = _half_tangent(shape.tilt)
+        return CYLINDER, (tangent, tangent, 0.5 * shape.height)
+    if isinstance(shape, Sphere):
+        return ELLIPSOID, (shape.radius,) * 3
+    if isinstance(shape, Ellipsoid):
+        return ELLIPSOID, shape.semi_axes
+    return POINTS, np.abs(points).max(axis=0).tolist()
 
 
 def _half_tangent(tilt: float) -> float:
