@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tpm_design.evaluation.goals import scaled_objective
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.optimizers.base import FloatArray, Outcomes, Slopes
 from tpm_design.problem import Goal, Problem
@@ -67,8 +68,7 @@ def slopes_of(problem: Problem, result: Evaluation, sizes: Sequence[int], rates:
         return None
     continuous = rates != 0.0
     gradient = np.zeros(len(rates))
-    sign = (1.0 if goal.sense == "minimize" else -1.0) / goal.metric.scale
-    gradient[continuous] = sign * np.array(known[goal.label][0])
+    gradient[continuous] = scaled_objective(goal, 1.0) * np.array(known[goal.label][0])
     jacobian = np.zeros((sum(sizes), len(rates)))
     first = 0
     for constraint, size in zip(problem.constraints, sizes, strict=True):
@@ -84,8 +84,8 @@ def slopes_of(problem: Problem, result: Evaluation, sizes: Sequence[int], rates:
 def _objective_pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:
     """Values of which the greatest is the objective; its own one ``size`` times where there are no such."""
     value = minimised_value(goal, result)
-    sign = (1.0 if goal.sense == "minimize" else -1.0) / goal.metric.scale
-    pieces = tuple(sign * piece for piece in result.pieces.get(goal.label, ()))
+    unit = scaled_objective(goal, 1.0)
+    pieces = tuple(unit * piece for piece in result.pieces.get(goal.label, ()))
     return pieces if len(pieces) == size and max(pieces) == value else (value,) * size
 
 

@@ -27,6 +27,15 @@ SLOPE_STEP = 1e-7
 
 
 @dataclass(frozen=True)
+class _Around:
+    """Designs next to a point. ``rates`` (n,): by which the values of the variables grow with their
+    coordinates, 0 of discrete ones."""
+
+    neighbours: Neighbours
+    rates: FloatArray
+
+
+@dataclass(frozen=True)
 class UnitSearch:
     """A ``Search`` over a design space, up to ``limit`` entries in the log. ``sizes``: in how many smooth
     pieces each constraint is given to the optimiser; ``objective_sizes``: each objective, empty for one."""
@@ -64,45 +73,32 @@ class UnitSearch:
         """As ``SlopedSearch``."""
         table = np.atleast_2d(np.asarray(points, dtype=np.float64))
         designs = [self.space.design(point) for point in table]
-        around = [
-            self._neighbours(point) if asked else None for point, asked in zip(table, sloped, strict=True)
-        ]
-        results = self.log.evaluations(designs, self.limit, neighbours=around)
+        around = [self._around(point) if asked else None for point, asked in zip(table, sloped, strict=True)]
+        neighbours = [None if beside is None else beside.neighbours for beside in around]
+        results = self.log.evaluations(designs, self.limit, neighbours=neighbours)
         found = outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
         return replace(
             found,
             slopes=tuple(
-                slopes_of(self.log.problem, result, self.sizes, self._rates(point)) if asked else None
-                for point, result, asked in zip(table, results, sloped, strict=True)
+                None if beside is None else slopes_of(self.log.problem, result, self.sizes, beside.rates)
+                for result, beside in zip(results, around, strict=True)
             ),
         )
 
-    def _neighbours(self, point: FloatArray) -> Neighbours:
-        """One along each continuous variable."""
-        found = []
-        for number, step in enumerate(self._steps(point)):
-            if step:
+    def _around(self, point: FloatArray) -> _Around:
+        """One along each continuous variable, towards the middle of the cube."""
+        neighbours, rates = [], np.zeros(self.dimension)
+        for number, (variable, coordinate) in enumerate(
+            zip(self.space.variables, point.tolist(), strict=True)
+        ):
+            if not variable.values:
+                step = -SLOPE_STEP if coordinate > 0.5 else SLOPE_STEP
+                change = float(value_at(variable, coordinate + step)) - float(value_at(variable, coordinate))
                 moved = point.copy()
                 moved[number] += step
-                found.append(Neighbour(self.space.design(moved), self._change(number, point, step)))
-        return tuple(found)
-
-    def _steps(self, point: FloatArray) -> FloatArray:
-        """Those to the neighbours (n,): towards the middle of the cube, 0 along discrete variables."""
-        continuous = np.array([count == 0 for count in self.levels])
-        return np.where(continuous, np.where(point > 0.5, -SLOPE_STEP, SLOPE_STEP), 0.0)
-
-    def _change(self, number: int, point: FloatArray, step: float) -> float:
-        """Of a variable's value over a step of its coordinate."""
-        variable, coordinate = self.space.variables[number], float(point[number])
-        return float(value_at(variable, coordinate + step)) - float(value_at(variable, coordinate))
-
-    def _rates(self, point: FloatArray) -> FloatArray:
-        """By which values grow with their coordinates (n,): 0 along discrete variables."""
-        steps = self._steps(point)
-        return np.array(
-            [self._change(n, point, step) / step if step else 0.0 for n, step in enumerate(steps)]
-        )
+                neighbours.append(Neighbour(self.space.design(moved), change))
+                rates[number] = change / step
+        return _Around(tuple(neighbours), rates)
 
     def screen(self, points: FloatArray, keep: int) -> Outcomes:
         """As ``ScreeningSearch``. The cutoff of each ``SCREENED`` points is the best ``keep``-th of those
