@@ -14,7 +14,7 @@ import tpm_design as tpm
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.metrics.base import Measurement
 from tpm_design.metrics.context import Context
-from tpm_design.optimizers.base import Slopes
+from tpm_design.optimizers.base import Outcomes, Question, Slopes
 from tpm_design.optimizers.watch import Watch
 from tpm_design.problem import Problem, Sample
 from tpm_design.runs.entry import Entry
@@ -64,8 +64,13 @@ def view(problem: Problem) -> UnitSearch:
     return whole.in_pieces()
 
 
+def with_slopes(seen: UnitSearch, point: np.ndarray) -> Outcomes:
+    (found,) = seen.answers([Question(point[None, :], sloped=True)])
+    return found
+
+
 def slopes_at(seen: UnitSearch, point: np.ndarray) -> Slopes:
-    (found,) = seen.evaluate_sloped(point[None, :], np.ones(1, dtype=np.bool_)).slopes
+    (found,) = with_slopes(seen, point).slopes
     assert found is not None
     return found
 
@@ -156,7 +161,7 @@ def test_what_is_not_known_to_first_order_has_no_slopes(problem: Problem) -> Non
     kept_to_itself = replace(last, metric=replace(last.metric, compute=measured))
     seen = view(replace(problem, constraints=(*others, kept_to_itself)))
     point = inner_points(seen.dimension, 1, 3)[0]
-    assert seen.evaluate_sloped(point[None, :], np.ones(1, dtype=np.bool_)).slopes == (None,)
+    assert with_slopes(seen, point).slopes == (None,)
 
 
 def timeless(evaluation: Evaluation) -> dict[str, Any]:
@@ -169,7 +174,7 @@ def test_slopes_are_no_evaluations_and_change_none(problem: Problem) -> None:
     plain = seen.evaluate(point)
     count = len(seen.log.entries)
     before = seen.log.entries[-1].evaluation
-    again = seen.evaluate_sloped(point[None, :], np.ones(1, dtype=np.bool_))
+    again = with_slopes(seen, point)
     after = seen.log.entries[-1].evaluation
     assert len(seen.log.entries) == count
     assert before.slopes is None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -90,13 +90,22 @@ class ScreeningSearch(Search, Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Question:
+    """Points (N, n) to be evaluated; ``sloped``: their slopes are asked for as well."""
+
+    points: FloatArray
+    sloped: bool = False
+
+
 @runtime_checkable
 class SlopedSearch(Search, Protocol):
     """A search that may know slopes."""
 
-    def evaluate_sloped(self, points: FloatArray, sloped: NDArray[np.bool_]) -> Outcomes:
-        """As ``evaluate``, with the slopes at those of the points (N,), which cost less than an evaluation
-        and do not count as one. Raises BudgetSpent."""
+    def answers(self, questions: Sequence[Question]) -> Generator[Outcomes]:
+        """As ``evaluate``, each question's values as soon as they and those before them are there, while the
+        others are still being evaluated; with slopes where they are asked for, which cost less than an
+        evaluation and do not count as one. Raises BudgetSpent."""
         ...
 
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.optimizers.base import FloatArray, Outcomes, Slopes
+from tpm_design.optimizers.base import FloatArray, Outcomes, Question, Slopes
 from tpm_design.optimizers.cuts import Cuts, cuts_near
 from tpm_design.optimizers.measure import FIRST_PENALTY, INSIDE, Measure
-from tpm_design.optimizers.places import Place, Question, looked_at
+from tpm_design.optimizers.places import Place, looked_at
 from tpm_design.optimizers.quadratic import Program, Step, elastic_step
 
 FINE = 1e-6

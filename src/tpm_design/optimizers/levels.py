@@ -6,8 +6,9 @@ from itertools import combinations, product
 
 import numpy as np
 
+from tpm_design.optimizers.base import Question
 from tpm_design.optimizers.descent import Landing, Walk, descend
-from tpm_design.optimizers.places import Question, looked_at, places
+from tpm_design.optimizers.places import looked_at, places
 from tpm_design.optimizers.starts import Choice, Levels, choice_of
 
 FEW_LEVELS = 4

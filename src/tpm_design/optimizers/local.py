@@ -6,7 +6,7 @@ import numpy as np
 
 from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer
 from tpm_design.optimizers.descent import Walk, descend
-from tpm_design.optimizers.places import answered, looked_at
+from tpm_design.optimizers.places import looked_at
 from tpm_design.optimizers.watch import LOCAL_STEP, Watch, watched
 
 
@@ -21,7 +21,7 @@ def descent(watch: Watch, seed: int) -> str:
     asked = next(walk)
     while True:
         try:
-            (found,) = answered(watch, [asked])
+            (found,) = watch.answers([asked])
             asked = walk.send(found)
         except StopIteration:
             return "Converged: no step leads further downhill."

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass
 from math import prod
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer, Outcomes, Search
+from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer, Outcomes, Question, Search
 from tpm_design.optimizers.descent import BLURRED, SHARP, Landing, descend
 from tpm_design.optimizers.levels import descend_levels
-from tpm_design.optimizers.places import Place, Question, answered, looked_at, places
+from tpm_design.optimizers.places import Place, looked_at, places
 from tpm_design.optimizers.starts import Starts, are_one, choice_of
 from tpm_design.optimizers.watch import Watch
 
@@ -141,9 +142,10 @@ class _Course:
                 task = self._next_task()
                 if (first := next(task, None)) is not None:
                     under_way.append(_UnderWay(task, first))
-            found = self._answered([one.asked for one in under_way])
-            for one, outcomes in zip(under_way, found, strict=True):
-                one.go_on(outcomes)
+            # a search goes on as soon as its question is answered, while those of others are being evaluated
+            with closing(self._answers([one.asked for one in under_way])) as answers:
+                for one, outcomes in zip(under_way, answers, strict=True):
+                    one.go_on(outcomes)
             self._left = [*self._left, *(one.best for one in under_way if one.over and one.best)]
             under_way = [one for one in under_way if not one.over]
         if self._designs <= ENUMERATED:
@@ -152,17 +154,28 @@ class _Course:
         hits = sum(optimum.hits for optimum in self._best_ones())
         return f"Converged: {hits} of {self._landed} independent local searches ended at the best objective."
 
-    def _answered(self, questions: list[Question]) -> list[Outcomes]:
+    def _answers(self, questions: list[Question]) -> Generator[Outcomes]:
         """Outcomes with the constraints in pieces: in more of them once a design has more."""
-        found = answered(self._pieces, questions)
-        if isinstance(self._search, PiecewiseSearch):
-            pieces = self._search.in_pieces()
-            if pieces.constraint_count != self._pieces.constraint_count:
-                self._pieces = Watch(pieces)
-                found = answered(self._pieces, questions)
-        if any(known is not None for outcomes in found for known in outcomes.slopes):
-            self._abreast = SLOPED_ABREAST
-        return found
+        with closing(self._pieces.answers(questions)) as answers:
+            for number, outcomes in enumerate(answers):
+                if self._more_pieces():
+                    # what is being evaluated comes to its end, and is asked again in more pieces
+                    list(answers)
+                    yield from self._answers(questions[number:])
+                    return
+                if any(slopes is not None for slopes in outcomes.slopes):
+                    self._abreast = SLOPED_ABREAST
+                yield outcomes
+
+    def _more_pieces(self) -> bool:
+        """Whether a design has more pieces than were asked for so far; from here on they are."""
+        if not isinstance(self._search, PiecewiseSearch):
+            return False
+        pieces = self._search.in_pieces()
+        if pieces.constraint_count == self._pieces.constraint_count:
+            return False
+        self._pieces = Watch(pieces)
+        return True
 
     # ------------------------------------------------------------------------------ what is begun
 

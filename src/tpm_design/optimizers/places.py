@@ -1,35 +1,16 @@
-"""What local searches ask, and points with what was found there, as they compare them."""
+"""Points with what was found there, as local searches compare them."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
 
-from tpm_design.optimizers.base import FloatArray, Outcomes, Slopes
-from tpm_design.optimizers.watch import Watch
+from tpm_design.optimizers.base import FloatArray, Outcomes, Question, Slopes
 
 IMPROVED = 1e-7
 """Share of the objective by which a better place must be better."""
-
-
-@dataclass(frozen=True)
-class Question:
-    """Points (N, n) to be evaluated; ``sloped``: their slopes are asked for as well."""
-
-    points: FloatArray
-    sloped: bool = False
-
-
-def answered(watch: Watch, questions: Sequence[Question]) -> list[Outcomes]:
-    """The outcomes of each question, all of them from one batch."""
-    points = np.vstack([question.points for question in questions])
-    sloped = np.repeat([question.sloped for question in questions], [len(q.points) for q in questions])
-    found = watch.evaluate_sloped(points, sloped)
-    ends = np.cumsum([0, *(len(question.points) for question in questions)]).tolist()
-    return [found.part(slice(*pair)) for pair in itertools.pairwise(ends)]
 
 
 @dataclass(frozen=True)

@@ -6,17 +6,19 @@ answers nothing more afterwards, and ``watched`` lets it out again whatever the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import itertools
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tpm_design.errors import RefusedError
 from tpm_design.optimizers.base import (
     FloatArray,
     FrontSearch,
     Outcomes,
+    Question,
     ScreeningSearch,
     Search,
     SlopedSearch,
@@ -72,12 +74,21 @@ class Watch:
         """
         return self._asked(points, self.search.evaluate)
 
-    def evaluate_sloped(self, points: FloatArray, sloped: NDArray[np.bool_]) -> Outcomes:
-        """As ``evaluate``, with the slopes at those of the points (N,), where the search knows them."""
+    def answers(self, questions: Sequence[Question]) -> Generator[Outcomes]:
+        """As ``evaluate``, of each question in turn, and with the slopes that are asked for, where the search
+        knows them."""
+        points = np.vstack([question.points for question in questions])
+        ends = np.cumsum([0, *(len(question.points) for question in questions)]).tolist()
+        parts = [slice(*pair) for pair in itertools.pairwise(ends)]
         search = self.search
         if not isinstance(search, SlopedSearch):
-            return self.evaluate(points)
-        return self._asked(points, lambda inside: search.evaluate_sloped(inside, sloped))
+            found = self.evaluate(points)
+            yield from (found.part(rows) for rows in parts)
+            return
+        with self._watching():
+            inside = self._inside(points)
+            moved = [replace(one, points=inside[rows]) for one, rows in zip(questions, parts, strict=True)]
+            yield from search.answers(moved)
 
     def screen(self, points: FloatArray, keep: int) -> Outcomes:
         """As ``evaluate``, the ``keep`` best of them to the end; all where the search cannot screen."""
@@ -87,18 +98,30 @@ class Watch:
         return self._asked(points, lambda inside: search.screen(inside, keep))
 
     def _asked(self, points: FloatArray, ask: Callable[[FloatArray], Outcomes]) -> Outcomes:
+        with self._watching():
+            return ask(self._inside(points))
+
+    @contextmanager
+    def _watching(self) -> Generator[None]:
+        """Keep what ends the search, and raise it again instead of going on."""
         if self.stopped is not None:
             raise self.stopped
         try:
-            # + 0.0 turns -0.0 into 0.0: the same point must have the same bits.
-            inside: FloatArray = np.clip(np.asarray(points, dtype=np.float64), 0.0, 1.0) + 0.0
-            if np.isnan(inside).any():
-                raise Stalled("The method broke down: it asked for a point that is not a number.")
-            self._note(inside)
-            return ask(inside)
+            yield
+        except GeneratorExit:
+            # whoever asked wants no more of these answers
+            raise
         except BaseException as reason:
             self.stopped = reason
             raise
+
+    def _inside(self, points: FloatArray) -> FloatArray:
+        # + 0.0 turns -0.0 into 0.0: the same point must have the same bits.
+        inside: FloatArray = np.clip(np.asarray(points, dtype=np.float64), 0.0, 1.0) + 0.0
+        if np.isnan(inside).any():
+            raise Stalled("The method broke down: it asked for a point that is not a number.")
+        self._note(inside)
+        return inside
 
     def objective(self, point: FloatArray) -> float:
         """The objective at one point (n,)."""
@@ -120,7 +143,7 @@ class Watch:
         Difference quotients over ± ``DIFFERENCE_STEP``: central, one-sided where a bound is nearer.
         """
         middle = np.clip(point, 0.0, 1.0)
-        found = self.evaluate_sloped(middle[None, :], np.ones(1, dtype=np.bool_))
+        (found,) = self.answers([Question(middle[None, :], sloped=True)])
         if found.slopes and found.slopes[0] is not None:
             return Tangents(float(found.objective[0]), found.constraints[0], found.slopes[0])
         size = self.dimension

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -51,47 +51,57 @@ class EvaluationLog:
         self._executor = executor
 
     def evaluations(
+        self, designs: Sequence[Design], limit: int, cutoff: Cutoff | None = None
+    ) -> list[Evaluation]:
+        """``as_they_come``, all of them."""
+        with closing(self.as_they_come(designs, limit, cutoff)) as evaluations:
+            return list(evaluations)
+
+    def as_they_come(
         self,
         designs: Sequence[Design],
         limit: int,
         cutoff: Cutoff | None = None,
         neighbours: Sequence[Neighbours | None] = (),
-    ) -> list[Evaluation]:
-        """Evaluations of the designs, in order; repeated ones are answered from the log, an aborted one only
-        where ``cutoff`` would abort it as well: else it becomes another entry. ``neighbours``: those of each
-        design, None where its slopes are not asked for; slopes alone make no other entry.
+    ) -> Generator[Evaluation]:
+        """Evaluations of the designs, in order, each as soon as it and those before it are logged; repeated
+        ones are answered from the log, an aborted one only where ``cutoff`` would abort it as well: else it
+        becomes another entry. ``neighbours``: those of each design, None where its slopes are not asked for;
+        slopes alone make no other entry.
 
         Raises BudgetSpent once the log holds ``limit`` entries and another is needed; what fits is
         evaluated and logged first.
         """
         keys = [design_key(design) for design in designs]
         asked = {key: around for key, around in zip(keys, neighbours, strict=False) if around is not None}
-        fresh: dict[Key, Design] = {}
-        unsloped: dict[Key, Design] = {}
+        wanted: dict[Key, _Wanted] = {}
+        left, beyond = max(0, limit - len(self.entries)), None
         for key, design in zip(keys, designs, strict=True):
+            question = _Question(design, asked.get(key))
+            if key in wanted:
+                continue
             if not self._is_known(key, cutoff):
-                fresh.setdefault(key, design)
-            elif key in asked and self.entries[self._places[key]].evaluation.slopes is None:
-                unsloped[key] = design
-        allowed = max(0, limit - len(self.entries))
-        wanted = list(fresh.items())[:allowed]
-        answers = [self._answer(key, cutoff, sloped=key in asked) for key, _ in wanted]
-        questions = [
-            _Question(design, asked.get(key))
-            for (key, design), answer in zip(wanted, answers, strict=True)
-            if answer is None
-        ] + [_Question(design, asked[key]) for key, design in unsloped.items()]
+                if not left:
+                    beyond = key
+                    break
+                left -= 1
+                wanted[key] = _Wanted(question, self._answer(key, cutoff, sloped=key in asked))
+            elif key in asked and self._known(key).slopes is None:
+                wanted[key] = _Wanted(question, None, again=True)
+        open_ones = [one.question for one in wanted.values() if one.answer is None]
         measured = partial(_answered, cutoff=cutoff)
-        with closing(self._executor.as_they_end(measured, self.problem, questions)) as evaluated:
+        with closing(self._executor.as_they_end(measured, self.problem, open_ones)) as evaluated:
             results = in_order(evaluated)
-            for (key, _), answer in zip(wanted, answers, strict=True):
-                self._append(key, answer or next(results))
-            for key, result in zip(unsloped, results, strict=True):
-                place = self._places[key]
-                self.entries[place] = replace(self.entries[place], evaluation=result)
-        if len(wanted) < len(fresh):
-            raise BudgetSpent
-        return [self.entries[self._places[key]].evaluation for key in keys]
+            for key in keys:
+                one = wanted.pop(key, None)
+                if one is not None and one.again:
+                    place = self._places[key]
+                    self.entries[place] = replace(self.entries[place], evaluation=next(results))
+                elif one is not None:
+                    self._append(key, one.answer or next(results))
+                elif key == beyond:
+                    raise BudgetSpent
+                yield self._known(key)
 
     def _append(self, key: Key, result: Evaluation) -> None:
         self._places[key] = len(self.entries)
@@ -101,10 +111,13 @@ class EvaluationLog:
             self.most_pieces[label] = max(len(pieces), self.most_pieces.get(label, 1))
         self._record(entry)
 
+    def _known(self, key: Key) -> Evaluation:
+        return self.entries[self._places[key]].evaluation
+
     def _is_known(self, key: Key, cutoff: Cutoff | None) -> bool:
         if key not in self._places:
             return False
-        known = self.entries[self._places[key]].evaluation
+        known = self._known(key)
         return known.cutoff is None or (cutoff is not None and is_worse(self.problem, known, cutoff))
 
     def _answer(self, key: Key, cutoff: Cutoff | None, *, sloped: bool) -> Evaluation | None:
@@ -131,6 +144,16 @@ class _Question:
 
     design: Design
     neighbours: Neighbours | None
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What is not in the log yet, or there without the slopes that are asked for (``again``); the ``answer``
+    where it is stored."""
+
+    question: _Question
+    answer: Evaluation | None
+    again: bool = False
 
 
 def _answered(problem: Problem, question: _Question, cutoff: Cutoff | None) -> Evaluation:

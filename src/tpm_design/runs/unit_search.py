@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Generator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +13,7 @@ from numpy.typing import NDArray
 from tpm_design.design_space import DesignSpace, value_at
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.evaluation.slopes import Neighbour, Neighbours
-from tpm_design.optimizers.base import Outcomes
+from tpm_design.optimizers.base import Outcomes, Question
 from tpm_design.runs.entry import Entry
 from tpm_design.runs.log import EvaluationLog
 from tpm_design.runs.outcomes import outcomes, slopes_of
@@ -69,21 +72,21 @@ class UnitSearch:
         results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
         return outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
 
-    def evaluate_sloped(self, points: FloatArray, sloped: NDArray[np.bool_]) -> Outcomes:
+    def answers(self, questions: Sequence[Question]) -> Generator[Outcomes]:
         """As ``SlopedSearch``."""
-        table = np.atleast_2d(np.asarray(points, dtype=np.float64))
-        designs = [self.space.design(point) for point in table]
-        around = [self._around(point) if asked else None for point, asked in zip(table, sloped, strict=True)]
+        around = [self._around(point) if q.sloped else None for q in questions for point in q.points]
+        designs = [self.space.design(point) for question in questions for point in question.points]
         neighbours = [None if beside is None else beside.neighbours for beside in around]
-        results = self.log.evaluations(designs, self.limit, neighbours=neighbours)
-        found = outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
-        return replace(
-            found,
-            slopes=tuple(
-                None if beside is None else slopes_of(self.log.problem, result, self.sizes, beside.rates)
-                for result, beside in zip(results, around, strict=True)
-            ),
-        )
+        with closing(self.log.as_they_come(designs, self.limit, neighbours=neighbours)) as evaluations:
+            pairs = zip(evaluations, around, strict=True)
+            for question in questions:
+                results, besides = zip(*itertools.islice(pairs, len(question.points)), strict=True)
+                found = outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
+                slopes = tuple(
+                    None if beside is None else slopes_of(self.log.problem, result, self.sizes, beside.rates)
+                    for result, beside in zip(results, besides, strict=True)
+                )
+                yield replace(found, slopes=slopes)
 
     def _around(self, point: FloatArray) -> _Around:
         """One along each continuous variable, towards the middle of the cube."""
