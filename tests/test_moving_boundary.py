@@ -18,7 +18,6 @@ from tpm_design.workspace.moving_boundary import (
     field_near,
     mode_field_near,
     moving_boundary,
-    volume_near,
 )
 from tpm_design.workspace.region_geometry import place
 from tpm_design.workspace.regions import Box
@@ -79,6 +78,10 @@ def chosen(field: RayField, floor: float | None) -> int | None:
 def boundary_of(built: Mechanism, mode: Mode, floor: float | None, order: int = 9) -> MovingBoundary:
     field = mode_field(built, mode, order=order, sided=floor is not None, floor=floor or 0.0)
     return moving_boundary(built, mode, field, chosen(field, floor), floor)
+
+
+def volume_near(boundary: MovingBoundary, built: Mechanism) -> float:
+    return float(np.sum(mode_field_near(boundary, built).volumes))
 
 
 def slope(boundary: MovingBoundary, name: str, parameters: Parameters, length: str, limb: int) -> float:

@@ -14,7 +14,7 @@ from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.directions import ALL_OCTANTS, Octant, RaySet, ray_set
 from tpm_design.workspace.joined_sets import find, join
 from tpm_design.workspace.poses import aspect_code
-from tpm_design.workspace.rays import Segments, traced
+from tpm_design.workspace.rays import Segments, step_of, traced
 from tpm_design.workspace.region_geometry import BOX, CYLINDER, PlacedRegion
 
 # beside rays that are asked for alone
@@ -260,11 +260,7 @@ def _located(geometry, mode, origin, scale, directions, segments, component, pos
         for s in range(codes.size):
             if codes[s] == code:
                 ray = rays[s]
-                u, v, w = (
-                    scale[0] * directions[ray, 0],
-                    scale[1] * directions[ray, 1],
-                    scale[2] * directions[ray, 2],
-                )
+                u, v, w = step_of(scale, directions[ray])
                 along = (u * x + v * y + w * z) / (u * u + v * v + w * w)
                 along = min(end[s], max(start[s], along))
                 distance = math.sqrt((along * u - x) ** 2 + (along * v - y) ** 2 + (along * w - z) ** 2)

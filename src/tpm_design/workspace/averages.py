@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.indices import condition_at
-from tpm_design.workspace.rays import MOST_STEPS, next_share
+from tpm_design.workspace.rays import MOST_STEPS, next_share, step_of
 
 # along a segment, fine and coarse: 1/κ has kinks where singular values change places
 GAUSS_NODES = {"region": (8, 6), "aspect": (16, 12)}
@@ -98,12 +98,6 @@ def _scanned(  # type: ignore[no-untyped-def]
             count += 1
         low = t
     return count
-
-
-@inner
-def step_of(scale, direction):  # type: ignore[no-untyped-def]
-    """What a unit of a ray's parameter is in metres."""
-    return scale[0] * direction[0], scale[1] * direction[1], scale[2] * direction[2]
 
 
 @inner

@@ -19,7 +19,7 @@ from tpm_design.arithmetic import Dual, fast_kernel, inner, kernel, short_kernel
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.aspects import RayField, mode_scale
-from tpm_design.workspace.rays import Segments
+from tpm_design.workspace.rays import Segments, step_of
 
 Triple = tuple[float, float, float]
 
@@ -113,13 +113,13 @@ def _slopes(margins, slopes):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _slopes_across(geometry, mode, origin, scale, direction, t, slopes):  # type: ignore[no-untyped-def]
+def _slopes_across(geometry, mode, origin, step, t, slopes):  # type: ignore[no-untyped-def]
     """Difference quotients of the determinants along a ray, in place: where rays passed a hole of reach
     without noticing, the elbow's root is clamped and has no slope, while determinants go on."""
     h = 1e-6 * t
     slopes[:] = 0.0
     for side in (-1.0, 1.0):
-        x, y, z = _at(origin, scale, direction, t + side * h)
+        x, y, z = _at(origin, step, t + side * h)
         for row, value in enumerate(equations.singularity_margins(geometry, mode, x, y, z)):
             slopes[row] += 0.5 * side * value / h
 
@@ -138,23 +138,15 @@ def _determinant_gains(margins, slopes, floor, code, t, closing, gains):  # type
 
 
 @inner
-def _at(origin, scale, direction, t):  # type: ignore[no-untyped-def]
-    return (
-        origin[0] + t * (scale[0] * direction[0]),
-        origin[1] + t * (scale[1] * direction[1]),
-        origin[2] + t * (scale[2] * direction[2]),
-    )
+def _at(origin, step, t):  # type: ignore[no-untyped-def]
+    return origin[0] + t * step[0], origin[1] + t * step[1], origin[2] + t * step[2]
 
 
 @inner
-def _ray_pose(origin, scale, direction, t):  # type: ignore[no-untyped-def]
+def _ray_pose(origin, step, t):  # type: ignore[no-untyped-def]
     """A pose on a ray as Duals over the ray's parameter."""
-    x, y, z = _at(origin, scale, direction, t)
-    return (
-        Dual(x, (scale[0] * direction[0],)),
-        Dual(y, (scale[1] * direction[1],)),
-        Dual(z, (scale[2] * direction[2],)),
-    )
+    x, y, z = _at(origin, step, t)
+    return Dual(x, (step[0],)), Dual(y, (step[1],)), Dual(z, (step[2],))
 
 
 @kernel
@@ -175,11 +167,9 @@ def _moving_ends(geometry, mode, sided, floor, origin, scale, directions, segmen
         t = end[s] if closing else start[s]
         if t == 0.0:
             continue
-        direction = directions[rays[s]]
-        pose = _ray_pose(origin, scale, direction, t)
-        length = t * math.sqrt(
-            (scale[0] * direction[0]) ** 2 + (scale[1] * direction[1]) ** 2 + (scale[2] * direction[2]) ** 2
-        )
+        step = step_of(scale, directions[rays[s]])
+        pose = _ray_pose(origin, step, t)
+        length = t * math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
         # first: on the shell of reach determinants have no finite slope
         legs = equations.leg_margins(geometry, mode, *pose)
         limits = equations.mode_margins(geometry, mode, *pose)
@@ -193,7 +183,7 @@ def _moving_ends(geometry, mode, sided, floor, origin, scale, directions, segmen
         elif sided:
             margins = equations.singularity_margins(geometry, mode, *pose)
             if not _slopes(margins, slopes):
-                _slopes_across(geometry, mode, origin, scale, direction, t, slopes)
+                _slopes_across(geometry, mode, origin, step, t, slopes)
             gains = determinants[place]
             count = _determinant_gains(margins, slopes, floor, codes[s], t, closing, gains)
             if count > 0:
@@ -362,9 +352,3 @@ def field_near(boundary: MovingBoundary, mechanism: Mechanism, origin: Triple, s
 def mode_field_near(boundary: MovingBoundary, mechanism: Mechanism) -> RayField:
     """``field_near`` of a field of a whole mode."""
     return field_near(boundary, mechanism, (0.0, 0.0, 0.0), mode_scale(mechanism))
-
-
-def volume_near(boundary: MovingBoundary, mechanism: Mechanism) -> float:
-    """Volume (m³), to first order, of the boundary's part of the mode for a neighbouring machine; of the
-    boundary's own machine, the volume of its segments."""
-    return float(np.sum(mode_field_near(boundary, mechanism).volumes))

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from tpm_design.arithmetic import kernel, short_kernel
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.aspects import RayField
-from tpm_design.workspace.averages import Crossings, condition_along, step_of
+from tpm_design.workspace.averages import Crossings, condition_along
+from tpm_design.workspace.rays import step_of
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.mechanisms.pointwise import frobenius_row
 from tpm_design.mechanisms.velocity import adjugate_columns, cross, greatest_singular_vector, scaled_columns
 from tpm_design.workspace.aspects import RayField
-from tpm_design.workspace.averages import ray_nodes, step_of
+from tpm_design.workspace.averages import ray_nodes
+from tpm_design.workspace.rays import step_of
 
 
 @dataclass(frozen=True)

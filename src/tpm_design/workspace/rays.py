@@ -36,6 +36,12 @@ class Segments:
 
 
 @inner
+def step_of(scale, direction):  # type: ignore[no-untyped-def]
+    """What a unit of a ray's parameter is in metres."""
+    return scale[0] * direction[0], scale[1] * direction[1], scale[2] * direction[2]
+
+
+@inner
 def _place(origin, steps, ray, t, poses, n):  # type: ignore[no-untyped-def]
     """Write the pose at a ray parameter as the n-th column of poses (3, N)."""
     for axis in range(3):
