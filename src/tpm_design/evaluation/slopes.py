@@ -10,6 +10,7 @@ from tpm_design.errors import ParameterError
 from tpm_design.evaluation.contexts import neighbouring_contexts
 from tpm_design.evaluation.goals import slack_pieces
 from tpm_design.evaluation.samples import Sampled, samples_near
+from tpm_design.evaluation.violation import objective_pieces
 from tpm_design.metrics.base import UNDEFINED, Measurement
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Design, Problem
@@ -68,7 +69,7 @@ def _seen_near(
         near = measured[goal.label].near
         if near is not None:
             there = near(context)
-            in_pieces = there.pieces if len(problem.objectives) > 1 else ()
+            in_pieces = objective_pieces(problem, {goal.label: there}).get(goal.label)
             # what is undefined is level
             found[goal.label] = (0.0,) if UNDEFINED in there.notes else in_pieces or (there.value,)
     of_samples = samples_near(problem, context, sampled)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from tpm_design.mechanisms.base import MechanismKind
+from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.metrics.base import Measurement, Metric, Option
 from tpm_design.metrics.context import Context
 from tpm_design.metrics.following import extreme_measurement, out_of_reach, singular
@@ -20,6 +21,8 @@ from tpm_design.workspace.indices import CONDITION_2, CONDITION_FROBENIUS, Index
 from tpm_design.workspace.moving_level import MovingLevel, moving_level, volume_above_near
 from tpm_design.workspace.moving_mean import MovingMean, integral_near, moving_mean
 from tpm_design.workspace.region_geometry import POINTS
+
+Moving = TypeVar("Moving", MovingMean, MovingLevel)
 
 SOURCE = "C. Gosselin, J. Angeles, A global performance index for the kinematic optimization, 1991"
 NORM = Option("norm", "choice", "norm of the condition number", default="2", choices=("2", "frobenius"))
@@ -134,8 +137,7 @@ class MovingConditioning:
 
     @cached_property
     def _means(self) -> tuple[MovingMean, ...]:
-        machine, mode = self.moving.mechanism, self.moving.mode
-        frobenius, motor = self.options["norm"] == "frobenius", machine.motor_weight(self.options["drive"])
+        machine, mode, frobenius, motor = self._measured_by
         nodes = GAUSS_NODES[self.options["over"]]
         return tuple(
             moving_mean(machine, mode, boundary.field, frobenius=frobenius, motor=motor, nodes=count)
@@ -144,37 +146,36 @@ class MovingConditioning:
 
     @cached_property
     def _levels(self) -> tuple[MovingLevel, ...]:
-        machine, mode = self.moving.mechanism, self.moving.mode
-        frobenius, motor = self.options["norm"] == "frobenius", machine.motor_weight(self.options["drive"])
+        machine, mode, frobenius, motor = self._measured_by
         return tuple(
             moving_level(machine, mode, boundary.field, found.crossings, frobenius=frobenius, motor=motor)
             for boundary, found in zip(self.moving.boundaries, self.averages, strict=True)
         )
 
+    @property
+    def _measured_by(self) -> tuple[Mechanism, Mode, bool, float]:
+        """Machine, mode, whether by the Frobenius norm, and the motors' weight."""
+        machine = self.moving.mechanism
+        motor = machine.motor_weight(self.options["drive"])
+        return machine, self.moving.mode, self.options["norm"] == "frobenius", motor
+
     def mean_near(self, neighbour: Context) -> Measurement:
-        fields = neighbour.moved(self.moving)
-        return self._shares(
-            fields,
-            [
-                integral_near(mean, neighbour.mechanism, field)
-                for mean, field in zip(self._means, fields, strict=True)
-            ],
-        )
+        return self._shares(integral_near, self._means, neighbour)
 
     def share_near(self, neighbour: Context) -> Measurement:
-        fields = neighbour.moved(self.moving)
-        return self._shares(
-            fields,
-            [
-                volume_above_near(level, neighbour.mechanism, field)
-                for level, field in zip(self._levels, fields, strict=True)
-            ],
-        )
+        return self._shares(volume_above_near, self._levels, neighbour)
 
-    def _shares(self, fields: tuple[RayField, RayField], integrals: list[float]) -> Measurement:
+    def _shares(
+        self,
+        integral: Callable[[Moving, Mechanism, RayField], float],
+        moving: Sequence[Moving],
+        neighbour: Context,
+    ) -> Measurement:
         fine, coarse = (
-            _share_of(self.options, integral, float(np.sum(field.volumes)), field)
-            for integral, field in zip(integrals, fields, strict=True)
+            _share_of(
+                self.options, integral(one, neighbour.mechanism, field), float(np.sum(field.volumes)), field
+            )
+            for one, field in zip(moving, neighbour.moved(self.moving), strict=True)
         )
         return Measurement(fine, abs(fine - coarse))
 
