@@ -64,6 +64,11 @@ def unwritable(what: str, error: OSError, path: Path, remedy: str | None = None)
     return UsageError(f"{what}: {error.strerror or error}.", where=str(path), remedy=remedy)
 
 
+def unwritable_file(error: OSError, path: Path) -> UsageError:
+    """``unwritable`` of one file that was asked for."""
+    return unwritable("This file cannot be written", error, path, "Its folder must exist and be writable.")
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """A remedy: the nearest known word, or all of them."""
     names = sorted(known)

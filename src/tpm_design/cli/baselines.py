@@ -35,7 +35,7 @@ from tpm_design.baselines.words import (
 )
 from tpm_design.cli.guard import OUTSIDE_TOLERANCE
 from tpm_design.cli.text import table
-from tpm_design.errors import UsageError, unwritable
+from tpm_design.errors import UsageError, unwritable_file
 
 
 def compare_runs(
@@ -159,6 +159,4 @@ def _write(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise unwritable(
-            "This file cannot be written", error, path, "Its folder must exist and be writable."
-        ) from None
+        raise unwritable_file(error, path) from None

@@ -19,7 +19,7 @@ from tpm_design.cli.progress import search_progress
 from tpm_design.cli.results import design_rows, evaluation_data, limit_text, result_text
 from tpm_design.cli.text import table
 from tpm_design.design_space import with_changes
-from tpm_design.errors import UsageError, unwritable
+from tpm_design.errors import UsageError, unwritable_file
 from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.mechanisms import mechanism_kind
 from tpm_design.problem import Design
@@ -55,9 +55,7 @@ def init_study(name: str, mechanism: str) -> int | None:
             "This file exists already.", where=str(path), remedy="Choose another name, or remove it."
         ) from None
     except OSError as error:
-        raise unwritable(
-            "This file cannot be written", error, path, "Its folder must exist and be writable."
-        ) from None
+        raise unwritable_file(error, path) from None
     print(f"Wrote {path}. Next: tpm-design optimize {path}")
     return None
 

@@ -120,12 +120,8 @@ def _text(study: Study, run: SweepRun, shard: Shard) -> str:
     allow = " --allow-code" if study.plug_in else ""
     lines = [run.status, f"Run: {run.folder}", f"Next: tpm-design {_following(run, shard)}{allow}"]
     if run.best is not None and run.best.evaluation.status == "feasible":
-        reached = (
-            f", {goal.label} {study.units.written(run.best.evaluation.metrics[goal.label], unit)}"
-            for goal in problem.objectives
-            for unit in (goal_unit(problem, goal),)
-        )
-        lines.insert(1, f"Best feasible design: point {run.best.number}{''.join(reached)}.")
+        reached = [f"{goal.label} {_reached(study, run.best, goal)}" for goal in problem.objectives]
+        lines.insert(1, f"Best feasible design: {', '.join([f'point {run.best.number}', *reached])}.")
     elif run.best is not None and run.best.evaluation.status == "infeasible":
         missed = [label for label, slack in run.best.evaluation.slacks.items() if slack < 0.0]
         lines.insert(
@@ -134,6 +130,10 @@ def _text(study: Study, run: SweepRun, shard: Shard) -> str:
             "What is held may lie badly: choose it in the study, or sweep it too.",
         )
     return "\n\n".join([*parts, "\n".join(lines)])
+
+
+def _reached(study: Study, entry: Entry, goal: Goal) -> str:
+    return study.units.written(entry.evaluation.metrics[goal.label], goal_unit(study.problem, goal))
 
 
 def _following(run: SweepRun, shard: Shard) -> str:
