@@ -22,9 +22,10 @@ from tpm_design.evaluation.result import Evaluation
 from tpm_design.problem import Problem
 from tpm_design.runs.dask_workers import dask_workers
 from tpm_design.runs.entry import Entry
-from tpm_design.runs.executors import SWITCH_INTERVAL, Executor, Threads, in_order
+from tpm_design.runs.executors import SWITCH_INTERVAL, Executor, Threads
 from tpm_design.runs.folder import RunWriter
 from tpm_design.study import load_study
+from tpm_design.worker_threads import in_order
 from workers import slow_points
 
 STUDY = Path(__file__).resolve().parents[1] / "studies" / "01-uru-cube.yaml"

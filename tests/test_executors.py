@@ -25,11 +25,11 @@ from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.mechanisms import MECHANISMS
 from tpm_design.problem import Problem
 from tpm_design.runs.dask_workers import CHUNK_SECONDS, HANDLING_SECONDS, DaskWorkers
-from tpm_design.runs.executors import SWITCH_INTERVAL, Threads, in_order
+from tpm_design.runs.executors import SWITCH_INTERVAL, Threads
 from tpm_design.runs.shipping import carried_out, packed, portable, unpacked
 from tpm_design.study import load_comparison, load_study
 from tpm_design.study.design import choose_design
-from tpm_design.worker_threads import AHEAD, in_a_thread
+from tpm_design.worker_threads import AHEAD, in_a_thread, in_order
 
 STUDIES = sorted((Path(__file__).parents[1] / "studies").glob("*.yaml"))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from _thread import start_new_thread
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Generic, NoReturn, TypeVar
@@ -74,6 +74,17 @@ class WorkerThreads:
 
 
 THIS_THREAD = WorkerThreads(1)
+
+
+def in_order(results: Iterable[tuple[int, Result]]) -> Iterator[Result]:
+    """Results by their places 0, 1, 2, …, each as soon as those before it are there."""
+    early: dict[int, Result] = {}
+    following = 0
+    for place, result in results:
+        early[place] = result
+        while following in early:
+            yield early.pop(following)
+            following += 1
 
 
 class _Batch(Generic[Item, Result]):

@@ -30,9 +30,9 @@ from tpm_design.evaluation.evaluate import evaluate
 from tpm_design.problem import Design
 from tpm_design.runs import dask_workers
 from tpm_design.runs.entry import Entry
-from tpm_design.runs.executors import in_order
 from tpm_design.runs.folder import entry_to_json, read_run
 from tpm_design.study.sweep_points import sweep_points
+from tpm_design.worker_threads import in_order
 
 GRID = (
     "sweep: {type: grid, parameters: {f: {min: 200, max: 300, num: 7}, r: {num: 6}, k: {values: [1, 2]}}}\n"

@@ -17,7 +17,7 @@ from tpm_design.mechanisms.mechanism import Mechanism
 from tpm_design.mechanisms.parameters import limb_tolerances
 from tpm_design.metrics.context import Context
 from tpm_design.problem import Design, Goal, Problem
-from tpm_design.worker_threads import WorkerThreads
+from tpm_design.worker_threads import WorkerThreads, in_order
 
 Box = tuple[tuple[float, float], ...]
 
@@ -90,8 +90,7 @@ def verdict(
         return settle(problem, demand, context, tolerance, boxes=boxes, with_slack=with_slack)
 
     with closing(WorkerThreads(workers)) as pool, closing(pool.as_they_end(settled, distinct)) as ending:
-        by_place = dict(ending)
-    settlements = tuple(by_place[place] for place in range(len(distinct)))
+        settlements = tuple(in_order(ending))
     numbers = {demand: number for number, demand in enumerate(distinct)}
     requirements = tuple(
         Requirement(goal, "undecided", None, (), None, need)

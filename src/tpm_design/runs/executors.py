@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from typing import Protocol, TypeVar
 
@@ -65,14 +65,3 @@ class Threads:
             self._pool.close()
         finally:
             sys.setswitchinterval(self._interval_before)
-
-
-def in_order(results: Iterable[tuple[int, Result]]) -> Iterator[Result]:
-    """Results by their places 0, 1, 2, …, each as soon as those before it are there."""
-    early: dict[int, Result] = {}
-    following = 0
-    for place, result in results:
-        early[place] = result
-        while following in early:
-            yield early.pop(following)
-            following += 1

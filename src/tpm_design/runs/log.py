@@ -15,8 +15,9 @@ from tpm_design.evaluation.slopes import Neighbours
 from tpm_design.optimizers.base import BudgetSpent
 from tpm_design.problem import Design, Problem
 from tpm_design.runs.entry import Answers, Entry, Key, design_key, samples_digest
-from tpm_design.runs.executors import Executor, in_order
+from tpm_design.runs.executors import Executor
 from tpm_design.runs.ranking import best_entry, rank
+from tpm_design.worker_threads import in_order
 
 
 class EvaluationLog:
