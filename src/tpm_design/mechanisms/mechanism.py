@@ -179,11 +179,8 @@ class Mechanism(ABC):
 
     def determinants_at(self, coordinates: FloatArray, mode: Mode) -> FloatArray:
         """``determinants`` at coordinates (N, 3)."""
-        x, y, z = pointwise.columns(coordinates)
-        out = np.empty((len(self.kind.determinants), x.size))
-        pointwise.singularity_row(self.geometry, mode.signs, x, y, z, out)
-        out[np.isnan(out)] = 0.0
-        return out
+        poses = np.asarray(coordinates, dtype=np.float64)
+        return np.asarray(pointwise.determinant_table(self.geometry, mode.signs, poses))
 
     def joint_centres(self, pose: ArrayLike, mode: Mode) -> FloatArray:
         """Joint centres (limbs, centres, 3) in metres at one pose, from the base along each limb."""

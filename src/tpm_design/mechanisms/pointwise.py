@@ -6,9 +6,19 @@ import math
 
 import numpy as np
 
-from tpm_design.arithmetic import fast_kernel, inner, kernel
+from tpm_design.arithmetic import fast_kernel, inner, kernel, short_kernel
 from tpm_design.mechanisms import equations
 from tpm_design.mechanisms.velocity import inverse_condition_frobenius, jacobian
+
+
+@inner
+def rows_of(points):  # type: ignore[no-untyped-def]
+    """x, y, z (N,) of poses (N, 3), each contiguous."""
+    count = points.shape[0]
+    x, y, z = np.empty(count), np.empty(count), np.empty(count)
+    for n in range(count):
+        x[n], y[n], z[n] = points[n, 0], points[n, 1], points[n, 2]
+    return x, y, z
 
 
 @fast_kernel
@@ -36,6 +46,32 @@ def singularity_row(geometry, mode, x, y, z, determinants):  # type: ignore[no-u
         values = equations.singularity_margins(geometry, mode, x[n], y[n], z[n])
         for k in range(len(values)):
             determinants[k, n] = values[k]
+
+
+@kernel
+def determinant_table(geometry, mode, points):  # type: ignore[no-untyped-def]
+    """Signed determinants (D, N) at poses (N, 3), 0 where undefined."""
+    x, y, z = rows_of(points)
+    count = len(equations.singularity_margins(geometry, mode, 0.0, 0.0, 0.0))
+    out = np.empty((count, x.size))
+    singularity_row(geometry, mode, x, y, z, out)
+    for k in range(count):
+        for n in range(x.size):
+            if math.isnan(out[k, n]):
+                out[k, n] = 0.0
+    return out
+
+
+@short_kernel
+def kept_sides(determinants):  # type: ignore[no-untyped-def]
+    """Of each row (D, N) the side, ±1, of its least and its greatest value together."""
+    sides = np.empty(determinants.shape[0])
+    for k in range(sides.size):
+        least, greatest = math.inf, -math.inf
+        for value in determinants[k]:
+            least, greatest = min(least, value), max(greatest, value)
+        sides[k] = 1.0 if least + greatest >= 0.0 else -1.0
+    return sides
 
 
 @fast_kernel
@@ -107,16 +143,6 @@ def jacobian_row(geometry, mode, motor, x, y, z, out):  # type: ignore[no-untype
 def centres_at(geometry, mode, x, y, z):  # type: ignore[no-untyped-def]
     """Joint centres at one pose, nested tuples as the mechanism gives them."""
     return equations.joint_centres(geometry, mode, x, y, z)
-
-
-@inner
-def rows_of(points):  # type: ignore[no-untyped-def]
-    """x, y, z (N,) of poses (N, 3), each contiguous."""
-    count = points.shape[0]
-    x, y, z = np.empty(count), np.empty(count), np.empty(count)
-    for n in range(count):
-        x[n], y[n], z[n] = points[n, 0], points[n, 1], points[n, 2]
-    return x, y, z
 
 
 def columns(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

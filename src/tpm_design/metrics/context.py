@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
+from tpm_design.mechanisms.pointwise import kept_sides
 from tpm_design.metrics.moving_fields import MovingFields
 from tpm_design.workspace.aspects import RayField, locate, located, mode_fields, region_fields
 from tpm_design.workspace.extremes import Extreme, extremes_over_region
@@ -127,7 +128,8 @@ class Context:
     @cached_property
     def lattice_sides(self) -> tuple[float, ...]:
         """The side, ±1, that each determinant mostly keeps on the lattice."""
-        return tuple(1.0 if v.min() + v.max() >= 0.0 else -1.0 for v in self.lattice_determinants)
+        values = self.lattice_determinants
+        return tuple(kept_sides(values.reshape(len(values), -1)).tolist())
 
     @cached_property
     def sides(self) -> tuple[Sides, ...]:
@@ -156,13 +158,16 @@ class Context:
         order = max(3, round(SURVEY_RAYS_PER_SAMPLE * self.region_samples))
         return survey(self.mechanism, self.mode, order=order)
 
+    @cached_property
+    def _feelers(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return feelers(self.placed, max(3, round(FEELERS_PER_SAMPLE * self.region_samples)))
+
     def locus_distance(self, part: int) -> LocusDistance:
         """Distance (m) to the locus of one determinant, for a region reachable throughout.
 
         Feelers from the region see what is near, a survey of the whole mode what is small or far.
         """
-        count = max(3, round(FEELERS_PER_SAMPLE * self.region_samples))
-        points, normals = feelers(self.placed, count)
+        points, normals = self._feelers
         return locus_distance(
             self.mechanism.geometry,
             self.mode.signs,

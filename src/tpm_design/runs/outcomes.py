@@ -66,19 +66,16 @@ def slopes_of(problem: Problem, result: Evaluation, sizes: Sequence[int], rates:
     labels = (goal.label, *(constraint.label for constraint in problem.constraints))
     if known is None or any(label not in known for label in labels):
         return None
-    continuous = rates != 0.0
-    gradient = np.zeros(len(rates))
-    gradient[continuous] = scaled_objective(goal, 1.0) * np.array(known[goal.label][0])
-    jacobian = np.zeros((sum(sizes), len(rates)))
-    first = 0
+    rows = [[scaled_objective(goal, slope) for slope in known[goal.label][0]]]
     for constraint, size in zip(problem.constraints, sizes, strict=True):
-        rows = np.array(known[constraint.label]) / constraint.metric.scale
-        pieces = result.pieces[constraint.label]
+        slopes, pieces = known[constraint.label], result.pieces[constraint.label]
         if len(pieces) != size:
-            rows = rows[int(np.argmin(pieces))]
-        jacobian[first : first + size, continuous] = rows
-        first += size
-    return Slopes(gradient * rates, jacobian * rates)
+            slopes = (slopes[pieces.index(min(pieces))],) * size
+        rows += [[slope / constraint.metric.scale for slope in row] for row in slopes]
+    table = np.zeros((len(rows), len(rates)))
+    table[:, np.flatnonzero(rates)] = rows
+    table *= rates
+    return Slopes(table[0], table[1:])
 
 
 def _objective_pieces(goal: Goal, result: Evaluation, size: int) -> tuple[float, ...]:

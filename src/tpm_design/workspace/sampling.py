@@ -52,18 +52,23 @@ def feelers(region: PlacedRegion, samples: int) -> tuple[FloatArray, FloatArray]
     if region.form == POINTS:
         fan = _sphere(3)
         return np.repeat(region.points, len(fan), axis=0), np.tile(fan, (len(region.points), 1))
-    centre, half = np.asarray(region.centre), np.asarray(region.half)
-    if region.form == BOX:
-        points, normals = _box_feelers(samples)
-        return centre + half * points, normals
-    if region.form == CYLINDER:
-        points, normals = _cylinder_feelers(samples)
-        return centre + half * points, normals
+    points, normals = _feelers_about_centre(region.form, region.half, samples)
+    return np.asarray(region.centre) + points, normals
+
+
+@lru_cache(maxsize=16)
+def _feelers_about_centre(
+    form: int, half_edges: tuple[float, float, float], samples: int
+) -> tuple[FloatArray, FloatArray]:
+    half = np.asarray(half_edges)
+    if form in (BOX, CYLINDER):
+        points, normals = _box_feelers(samples) if form == BOX else _cylinder_feelers(samples)
+        return half * points, normals
     # between even normals and even points: both matter on a flat ellipsoid
     normals = _sphere(max(3, samples // 2)) / np.sqrt(half)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     support = half * half * normals
-    return centre + support / np.sqrt((support * normals).sum(axis=1, keepdims=True)), normals
+    return support / np.sqrt((support * normals).sum(axis=1, keepdims=True)), normals
 
 
 @lru_cache(maxsize=16)
