@@ -14,6 +14,7 @@ from tpm_design.metrics.base import Measurement, Metric, of_positions
 from tpm_design.metrics.context import Context
 from tpm_design.metrics.following import (
     extreme_measurement,
+    in_one_piece,
     out_of_reach,
     pieces_of,
     reach_shortfall,
@@ -33,7 +34,8 @@ SEARCH = "search along the region's normals, then sliding along the locus, ARCHI
 def _locus_distance(name: str) -> Callable[[Context, Mapping[str, Any]], Measurement]:
     def compute(context: Context, options: Mapping[str, Any]) -> Measurement:
         if not context.reachable:
-            return replace(reach_shortfall(context), notes={"locus": "out of reach"})
+            # without pieces: distances to a locus have none
+            return replace(in_one_piece(reach_shortfall(context)), notes={"locus": "out of reach"})
         if name not in context.mechanism.kind.determinants:
             return replace(span_measurement(context, context.size), notes={"locus": "none"})
         part = context.mechanism.kind.determinants.index(name)

@@ -7,6 +7,7 @@ fixed (J. M. Danskin, The theory of max-min, 1966). Poses move with the region's
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -126,9 +127,16 @@ def reach_shortfall(context: Context) -> Measurement:
     found, pieces = context.reach, reach_of(context)
 
     def near(other: Context) -> Measurement:
-        return Measurement(float(pieces(other).min()), found.error)
+        return _of_pieces(pieces(other), found, 1.0)
 
-    return Measurement(found.value, found.error, near=near)
+    return Measurement(found.value, found.error, pieces=found.pieces, near=near)
+
+
+def in_one_piece(measurement: Measurement) -> Measurement:
+    """The same without its pieces."""
+    near = measurement.near
+    there = None if near is None else lambda other: replace(near(other), pieces=())
+    return replace(measurement, pieces=(), near=there)
 
 
 def singular(context: Context, side: Sides) -> Measurement:
