@@ -109,6 +109,17 @@ def test_a_new_study_does_what_its_first_lines_say(
     )
 
 
+def test_the_best_design_of_a_new_study_is_not_one_of_its_limits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert tpm_design("init", "new", "--mechanism", "orthoglide").code == 0
+    best = json.loads(tpm_design("optimize", "new.yaml", "--json", "--quiet").output)["best"]
+    (limits,) = (v for v in tpm.load_study("new.yaml").problem.variables if v.name == "L")
+    assert best["status"] == "feasible"
+    assert 1.2 * limits.lower < 1e-3 * best["design"]["L"]["value"] < limits.upper / 1.2
+
+
 def test_init_keeps_an_existing_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("study.yaml").write_text("mine", encoding="utf-8")

@@ -36,7 +36,7 @@ def template(name: str, kind: MechanismKind) -> str:
     )
     limits = f"\n  # limits there are:\n{limits}" if limits else ""
     reach = kind.farthest_reach({parameter: (value, value) for parameter, value in kind.example.items()})
-    region = _region(kind, _round(_UNITS.from_si(reach, "m") / 8))
+    region = _region(kind, _round(_UNITS.from_si(reach, "m") / 6))
     return f"""\
 # A study for tpm-design. `tpm-design validate` checks it, `tpm-design optimize` runs it.
 version: 1
@@ -81,7 +81,7 @@ def _parameter(parameter: Parameter, kind: MechanismKind, free: bool) -> str:
     unit = si_unit(parameter.dimension)
     value = _UNITS.from_si(kind.example[parameter.name], unit)
     text = (
-        f"{{min: {_round(value / 2):g}, max: {_round(value * 2):g}, initial: {value:g}}}"
+        f"{{min: {_round(value / 5):g}, max: {_round(value * 2):g}, initial: {value:g}}}"
         if free
         else f"{value:g}"
     )
