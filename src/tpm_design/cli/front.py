@@ -14,7 +14,7 @@ from tpm_design.runs.entry import Entry
 from tpm_design.runs.front import spread
 from tpm_design.runs.marks import front_marks
 from tpm_design.runs.ranking import scaled_objectives
-from tpm_design.runs.tables import goal_unit, parameter_columns
+from tpm_design.runs.tables import free_columns, goal_unit
 from tpm_design.units import Units
 
 MOST_ROWS = 15
@@ -25,8 +25,7 @@ def front_text(problem: Problem, units: Units, front: Sequence[Entry]) -> str:
     """Objectives and free quantities along the front, best first by the first objective."""
     marks = front_marks(problem, front)
     shown = _shown(problem, front, marks)
-    free = {variable.name for variable in problem.variables}
-    columns = [column for column in parameter_columns(problem, units) if column.name in free]
+    columns = free_columns(problem, units)
     rows = []
     for place, (entry, mark) in enumerate(zip(front, marks, strict=True)):
         if place not in shown:

@@ -9,7 +9,7 @@ from tpm_design.report.escape import code_cell, table, text
 from tpm_design.report.reported import Reported
 from tpm_design.runs.entry import Entry
 from tpm_design.runs.folder import DESIGNS
-from tpm_design.runs.tables import goal_unit, parameter_columns
+from tpm_design.runs.tables import free_columns, goal_unit
 from tpm_design.units import Units
 
 
@@ -38,8 +38,7 @@ def optima_lines(reported: Reported) -> list[str]:
         return []
     entries = {entry.number: entry for entry in reported.run.entries}
     (goal,) = problem.objectives
-    free = {variable.name for variable in problem.variables}
-    columns = [column for column in parameter_columns(problem, units) if column.name in free]
+    columns = free_columns(problem, units)
     rows = []
     for place, number in enumerate(numbers, start=1):
         evaluation = entries[number].evaluation

@@ -37,6 +37,12 @@ def parameter_columns(problem: Problem, units: Units) -> list[Column]:
     return columns
 
 
+def free_columns(problem: Problem, units: Units) -> list[Column]:
+    """Those of ``parameter_columns`` that are searched."""
+    free = {variable.name for variable in problem.variables}
+    return [column for column in parameter_columns(problem, units) if column.name in free]
+
+
 def parameter_unit(kind: MechanismKind, name: str) -> str:
     """SI unit of a parameter, or of a coordinate of the region's centre."""
     parameter = kind.parameter(name)
