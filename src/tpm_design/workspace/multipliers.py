@@ -19,6 +19,8 @@ NOT_STATIONARY = 1e-3
 DEPENDENT = 1e-6
 # three independent gradients make up every other
 MOST_CONDITIONS = 3
+# columns of the rows of ``_choices``: two counts, then conditions, then normals
+CONDITIONS, NORMALS = 2, 2 + MOST_CONDITIONS
 
 
 @short_kernel
@@ -33,12 +35,13 @@ def _fewest(gradients, usable, two_sided, normals, choices):  # type: ignore[no-
             break
         columns = np.empty((3, held + beside))
         fits = True
-        first = normals[choices[row, 5]]
+        conditions, chosen = choices[row, CONDITIONS:NORMALS], choices[row, NORMALS:]
+        first = normals[chosen[0]]
         for n in range(held):
-            columns[:, n] = gradients[choices[row, 2 + n]]
-            fits = fits and usable[choices[row, 2 + n]]
+            columns[:, n] = gradients[conditions[n]]
+            fits = fits and usable[conditions[n]]
         for n in range(beside):
-            columns[:, held + n] = first - normals[choices[row, 6 + n]]
+            columns[:, held + n] = first - normals[chosen[1 + n]]
         if not fits:
             continue
         across, triangle = np.linalg.qr(columns)
@@ -55,7 +58,7 @@ def _fewest(gradients, usable, two_sided, normals, choices):  # type: ignore[no-
         for weight in weights:
             fits = fits and weight >= -NOT_STATIONARY
         for n in range(held):
-            fits = fits and (two_sided[choices[row, 2 + n]] or solution[n] >= -NOT_STATIONARY)
+            fits = fits and (two_sided[conditions[n]] or solution[n] >= -NOT_STATIONARY)
         left = first.copy()
         for n in range(held + beside):
             left -= columns[:, n] * solution[n]
@@ -91,7 +94,7 @@ def multipliers_of(
         return None
     multipliers[0] *= scale
     held = choices[row, 0]
-    return choices[row, 2 : 2 + held], multipliers[:held]
+    return choices[row, CONDITIONS : CONDITIONS + held], multipliers[:held]
 
 
 @cache
@@ -103,6 +106,10 @@ def _choices(normal_count: int, condition_count: int) -> NDArray[np.int64]:
         for beside in range(count):
             for chosen in itertools.combinations(range(1, condition_count), count - 1 - beside):
                 for first, *others in itertools.combinations(range(normal_count), 1 + beside):
-                    conditions = (0, *chosen, 0, 0)[:MOST_CONDITIONS]
-                    rows.append((count - beside, beside, *conditions, first, *others, *(0,) * (2 - beside)))
-    return np.array(rows, np.int64).reshape(-1, 2 + 2 * MOST_CONDITIONS)
+                    conditions, normals = _padded(0, *chosen), _padded(first, *others)
+                    rows.append((count - beside, beside, *conditions, *normals))
+    return np.array(rows, np.int64).reshape(-1, NORMALS + MOST_CONDITIONS)
+
+
+def _padded(*numbers: int) -> tuple[int, ...]:
+    return (*numbers, *(0,) * (MOST_CONDITIONS - len(numbers)))
