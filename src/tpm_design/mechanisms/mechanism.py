@@ -179,7 +179,8 @@ class Mechanism(ABC):
 
     def determinants_at(self, coordinates: FloatArray, mode: Mode) -> FloatArray:
         """``determinants`` at coordinates (N, 3)."""
-        poses = np.asarray(coordinates, dtype=np.float64)
+        # another layout would be compiled by itself
+        poses = np.ascontiguousarray(coordinates, dtype=np.float64)
         return np.asarray(pointwise.determinant_table(self.geometry, mode.signs, poses))
 
     def joint_centres(self, pose: ArrayLike, mode: Mode) -> FloatArray:

@@ -6,7 +6,6 @@ within reach, crowded towards the coordinate planes and the bounds of reach, whe
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
-from tpm_design.mechanisms.pointwise import rows_of, singularity_row
+from tpm_design.mechanisms.pointwise import determinant_table
 from tpm_design.workspace.aspects import mode_octants, reach_parts
 from tpm_design.workspace.directions import Octant, RaySet
 from tpm_design.workspace.indices import determinant_at
@@ -81,7 +80,7 @@ def _part_pairs(rays, neighbours, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _surveyed(geometry, mode, part_count, directions, neighbours, rays, start, end):  # type: ignore[no-untyped-def]
+def _surveyed(geometry, mode, directions, neighbours, rays, start, end):  # type: ignore[no-untyped-def]
     """Poses (S · K, 3), pairs and determinants (D, S · K) of ``Survey``."""
     poses = np.empty((rays.size * ALONG.size, 3))
     for s in range(rays.size):
@@ -89,32 +88,26 @@ def _surveyed(geometry, mode, part_count, directions, neighbours, rays, start, e
             t = start[s] + (end[s] - start[s]) * ALONG[k]
             for axis in range(3):
                 poses[s * ALONG.size + k, axis] = t * directions[rays[s], axis]
-    determinants = np.empty((part_count, poses.shape[0]))
-    x, y, z = rows_of(poses)
-    singularity_row(geometry, mode, x, y, z, determinants)
-    for part in range(part_count):
-        for n in range(poses.shape[0]):
-            if math.isnan(determinants[part, n]):
-                determinants[part, n] = 0.0
-    return poses, _part_pairs(rays, neighbours, directions.shape[0]), determinants
+    pairs = _part_pairs(rays, neighbours, directions.shape[0])
+    return poses, pairs, determinant_table(geometry, mode, poses)
 
 
 def survey(mechanism: Mechanism, mode: Mode, *, order: int) -> Survey:
     """The mode's workspace on ``order``² rays per square of an octant."""
     grids = _ray_grids(mode_octants(mode), order)
     parts = reach_parts(mechanism, mode, grids)
-    count = len(mechanism.kind.determinants)
     poses, pairs, determinants = _surveyed(
         mechanism.geometry,
         mode.signs,
-        count,
         grids.directions,
         grids.neighbours,
         parts.ray,
         parts.start,
         parts.end,
     )
-    return Survey(poses.reshape(-1, ALONG.size, 3), pairs, determinants.reshape(count, -1, ALONG.size))
+    return Survey(
+        poses.reshape(-1, ALONG.size, 3), pairs, determinants.reshape(len(determinants), -1, ALONG.size)
+    )
 
 
 @inner
