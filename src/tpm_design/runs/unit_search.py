@@ -89,7 +89,7 @@ class UnitSearch:
                 yield replace(found, slopes=slopes)
 
     def _around(self, point: FloatArray) -> _Around:
-        """One along each continuous variable, towards the middle of the cube."""
+        """A neighbour along each continuous variable, towards the middle of the cube."""
         neighbours, rates = [], np.zeros(self.dimension)
         for number, (variable, coordinate) in enumerate(
             zip(self.space.variables, point.tolist(), strict=True)

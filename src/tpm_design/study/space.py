@@ -66,7 +66,7 @@ def read_parameters(
 def _check_given(parameter: Parameter, kind: MechanismKind, given: Mapping[str, Any], faults: Faults) -> None:
     """Each parameter is given once: for all limbs, or for every limb by itself."""
     name = parameter.name
-    limbs = [f"{name}{limb + 1}" for limb in range(kind.limb_count)] if parameter.per_limb else []
+    limbs = kind.limb_names[name]
     single = [limb for limb in limbs if limb in given]
     if name in given and single:
         faults.add(
