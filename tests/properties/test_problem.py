@@ -86,10 +86,10 @@ def test_pieces_have_the_slack_of_the_value_as_their_least(
 
 
 def test_the_full_score_is_judged_by_its_margin() -> None:
-    full = Measurement(1.0, 0.0, full_slack=0.02)
-    missed = Measurement(0.9, 0.01, full_slack=-0.3)
-    assert slack_pieces(goal("coverage", minimum=1.0), full) == (0.02,)
-    assert slack_pieces(goal("coverage", minimum=1.0), missed) == (-0.3,)
+    full = Measurement(1.0, 0.0, full_slacks=(0.02, 0.5))
+    missed = Measurement(0.9, 0.01, full_slacks=(-0.3, 0.1))
+    assert slack_pieces(goal("coverage", minimum=1.0), full) == (0.02, 0.5)
+    assert slack_pieces(goal("coverage", minimum=1.0), missed) == (-0.3, 0.1)
     assert slack_pieces(goal("coverage", minimum=0.8), missed) == (pytest.approx(0.09),)
 
 
@@ -109,12 +109,21 @@ def everything() -> tuple[Goal, ...]:
     return tuple(goals)
 
 
+def bound_is_met(result: Evaluation, asked: Goal) -> bool:
+    """By the reported value, on the unfavourable side of its error."""
+    value, error = result.metrics[asked.label], result.errors[asked.label]
+    low = -math.inf if asked.minimum is None else asked.minimum
+    high = math.inf if asked.maximum is None else asked.maximum
+    return value - error >= low and value + error <= high
+
+
 def check(result: Evaluation, asked: Problem) -> None:
     for constraint in asked.constraints:
         slack = result.slacks[constraint.label]
         assert math.isfinite(slack)
         assert slack == min(result.pieces[constraint.label])
         assert (constraint.label in result.reason) == (slack < 0.0)
+        assert (slack >= 0.0) == bound_is_met(result, constraint)
     shortfall = sum(max(0.0, -result.slacks[c.label]) / c.metric.scale for c in asked.constraints)
     assert result.violation == pytest.approx(shortfall)
     assert (result.status == "feasible") == (result.violation == 0.0)

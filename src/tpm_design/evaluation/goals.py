@@ -33,8 +33,8 @@ def slack_pieces(goal: Goal, measurement: Measurement) -> tuple[float, ...]:
     metric's unit, or as the metric defines them where its value is flat."""
     if UNDEFINED in measurement.notes:
         return (-UNDEFINED_VIOLATION * goal.metric.scale,)
-    if measurement.full_slack is not None and goal.minimum is not None and goal.minimum >= 1.0:
-        return measurement.pieces or (measurement.full_slack,)
+    if measurement.full_slacks and goal.minimum is not None and goal.minimum >= 1.0:
+        return measurement.full_slacks
     return tuple(_slack(goal, measurement, value) for value in measurement.pieces or (measurement.value,))
 
 

@@ -43,9 +43,9 @@ class Measurement:
     """A metric's value in SI units with its numeric error.
 
     Values may be flat where a constraint on them fails; then ``depth`` ≤ 0 is added to a negative slack,
-    and ``full_slack`` replaces the slack of a constraint that asks for the full score 1 (coverage).
-    ``pieces``: values whose least (of a metric to be large) or greatest is ``value``, or the pieces of
-    ``full_slack``: smoother in the design than their minimum. ``notes`` are extra columns, such as which
+    and ``full_slacks`` replace the slack of a constraint that asks for the full score 1 (coverage).
+    ``pieces``: values whose least (of a metric to be large) or greatest is ``value``; like ``full_slacks``
+    smoother in the design than their minimum. ``notes`` are extra columns, such as which
     locus was nearest. ``near(context)``: the measurement of a neighbouring design, exact to first order,
     taken where this one's extremes are; a value that is not known so is NaN, ``near`` None where nothing is.
     """
@@ -53,7 +53,7 @@ class Measurement:
     value: float
     error: float = 0.0
     depth: float = 0.0
-    full_slack: float | None = None
+    full_slacks: tuple[float, ...] = ()
     notes: Mapping[str, str] = field(default_factory=dict)
     pieces: tuple[float, ...] = ()
     near: Callable[[Context], Measurement] | None = field(default=None, compare=False, repr=False)

@@ -73,23 +73,23 @@ def _ratio(volume: Measurement, size: Measurement) -> Measurement:
 def _coverage(context: Context, options: Mapping[str, Any]) -> Measurement:
     length = context.mechanism.reach_radius()
     reach = tuple(piece / length for piece in context.reach.pieces)
-    pieces = (*reach, *(piece for side in context.sides for piece in side.pieces))
-    worst = min(pieces)
+    slacks = (*reach, *(piece for side in context.sides for piece in side.pieces))
+    worst = min(slacks)
     of_reach, of_sides = reach_of(context), sides_of(context)
 
     def near(other: Context) -> Measurement:
         shares = of_reach(other) / other.mechanism.reach_radius()
         values = np.concatenate([shares, of_sides(other).ravel()])
         share = 1.0 if worst >= 0.0 else math.nan
-        return Measurement(share, full_slack=float(values.min()), pieces=tuple(values.tolist()))
+        return Measurement(share, full_slacks=tuple(values.tolist()))
 
     if worst >= 0.0:
-        return Measurement(1.0, 0.0, full_slack=worst, pieces=pieces, near=near)
+        return Measurement(1.0, 0.0, full_slacks=slacks, near=near)
     fine, coarse = _point_shares(context) if context.placed.form == POINTS else _solid_shares(context)
     # what the samples' polish found outside is smaller than the rays resolve
     share = min(fine, 1.0 - RESOLUTION)
     error = max(abs(fine - coarse), RESOLUTION)
-    return Measurement(share, error, full_slack=worst, pieces=pieces, near=near)
+    return Measurement(share, error, full_slacks=slacks, near=near)
 
 
 RESOLUTION = 1e-6
