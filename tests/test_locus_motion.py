@@ -13,6 +13,7 @@ from tpm_design.mechanisms import mechanism
 from tpm_design.metrics import METRICS
 from tpm_design.metrics.base import Measurement
 from tpm_design.metrics.context import Context
+from tpm_design.metrics.neighbourhood import Neighbourhood
 from tpm_design.workspace.loci import LocusDistance
 from tpm_design.workspace.locus_motion import LocusMotion, locus_motion
 from tpm_design.workspace.region_geometry import place, signed_distance_at
@@ -82,9 +83,15 @@ def moved(name: str, values: Values, way: Values, t: float) -> Context:
     return context_of(name, {key: value + t * way[key] for key, value in values.items()})
 
 
-def slope_of(name: str, values: Values, way: Values, here: Measurement) -> float:
+def near(here: Measurement, neighbour: Context) -> float:
+    """What a measurement says of one neighbouring design."""
     assert here.near is not None
-    return (here.near(moved(name, values, way, STEP)).value - here.value) / STEP
+    (value,) = here.near(Neighbourhood((neighbour,))).values.tolist()
+    return float(value)
+
+
+def slope_of(name: str, values: Values, way: Values, here: Measurement) -> float:
+    return (near(here, moved(name, values, way, STEP)) - here.value) / STEP
 
 
 def central_slope(name: str, values: Values, way: Values, locus: str) -> float | None:
@@ -112,11 +119,10 @@ def test_slopes_are_those_of_the_distance(name: str) -> None:
             if here.notes["locus"] != locus:
                 continue
             asked += 1
-            assert here.near is not None
-            if np.isnan(here.near(own).value):
+            if np.isnan(near(here, own)):
                 continue
             found += 1
-            assert here.near(own).value == here.value
+            assert near(here, own) == here.value
             motion = locus_motion(own.mechanism, own.mode, own.placed, part, own.locus_distance(part))
             assert motion is not None
             drawn = random.normal(size=len(values))
@@ -158,14 +164,13 @@ def test_distance_to_coordinate_planes_in_closed_form(name: str, axis: int) -> N
     centre[axis] = 0.25
     x, y, z = centre
     here = measured(uru_context(SHAPES[name], (x, y, z)), "rotation")
-    assert here.near is not None
     for n, slope in enumerate(float(n == axis) for n in range(3)):
         at = [c + 1e-6 * (n == k) for k, c in enumerate(centre)]
-        following = here.near(uru_context(SHAPES[name], (at[0], at[1], at[2])))
-        assert following.value - here.value == pytest.approx(1e-6 * slope, abs=1e-12)
+        following = near(here, uru_context(SHAPES[name], (at[0], at[1], at[2])))
+        assert following - here.value == pytest.approx(1e-6 * slope, abs=1e-12)
     for length, value in {"db": 0.1, "f": 0.8, "r": 0.8}.items():
         longer = uru_context(SHAPES[name], (x, y, z), **{length: value + 1e-6})
-        assert here.near(longer).value == pytest.approx(here.value, abs=1e-12)
+        assert near(here, longer) == pytest.approx(here.value, abs=1e-12)
 
 
 def test_depth_of_a_plane_that_cuts_a_box() -> None:
@@ -173,9 +178,8 @@ def test_depth_of_a_plane_that_cuts_a_box() -> None:
     box = Box((0.2, 0.3, 0.3))
     here = measured(uru_context(box, (0.04, 0.5, 0.5)), "rotation")
     assert here.value == pytest.approx(-0.06, abs=1e-6)
-    assert here.near is not None
-    following = here.near(uru_context(box, (0.04 + 1e-6, 0.5, 0.5 + 1e-6)))
-    assert following.value - here.value == pytest.approx(1e-6, abs=1e-12)
+    following = near(here, uru_context(box, (0.04 + 1e-6, 0.5, 0.5 + 1e-6)))
+    assert following - here.value == pytest.approx(1e-6, abs=1e-12)
 
 
 def own_motion(context: Context, found: LocusDistance) -> LocusMotion | None:
@@ -197,10 +201,9 @@ def test_out_of_reach_and_without_a_locus_slopes_are_those_of_what_stands_for_th
     beyond = uru_context(Sphere(0.1), (0.9, 0.9, 0.9))
     farther = uru_context(Sphere(0.1), (0.9, 0.9, 0.9 + 1e-7))
     here = measured(beyond, "rotation")
-    assert here.near is not None
-    assert here.near(beyond).value == pytest.approx(here.value, abs=1e-12)
+    assert near(here, beyond) == pytest.approx(here.value, abs=1e-12)
     change = farther.reach.value - beyond.reach.value
-    assert here.near(farther).value - here.near(beyond).value == pytest.approx(change, abs=1e-12)
+    assert near(here, farther) - near(here, beyond) == pytest.approx(change, abs=1e-12)
     # k = 1, elbows as the octant: det W keeps its sign throughout
     built = mechanism("uru", db=0.1, dp=0.1, f=0.8, r=0.8, k=1.0)
     mode = built.mode_of({"octant": "+++", "elbows": "+++"})
@@ -208,8 +211,7 @@ def test_out_of_reach_and_without_a_locus_slopes_are_those_of_what_stands_for_th
     none_context = Context(built, mode, place(Sphere(0.15), (0.5, 0.45, 0.6)), 1e-3, 9)
     none = measured(none_context, "actuation")
     assert none.notes["locus"] == "none"
-    assert none.near is not None
-    assert none.near(replace(none_context, mechanism=larger)).value > none.value
+    assert near(none, replace(none_context, mechanism=larger)) > none.value
 
 
 @pytest.mark.parametrize("shape", [*SHAPES.values(), Ellipsoid((0.06, 0.06, 0.1))], ids=str)

@@ -11,7 +11,9 @@ import pytest
 from tpm_design.mechanisms import MECHANISMS, mechanism
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.metrics import METRICS
+from tpm_design.metrics.base import Measurement, Nearby
 from tpm_design.metrics.context import Context
+from tpm_design.metrics.neighbourhood import Neighbourhood
 from tpm_design.workspace.aspects import RayField, mode_field, region_fields
 from tpm_design.workspace.moving_boundary import (
     MovingBoundary,
@@ -233,6 +235,16 @@ def test_region_that_moves_along() -> None:
     assert moved.volumes.sum() - field.volumes.sum() == pytest.approx(change, rel=1e-3)
 
 
+def near(measured: Measurement, *neighbours: Context) -> Nearby:
+    assert measured.near is not None
+    return measured.near(Neighbourhood(neighbours))
+
+
+def slope_near(measured: Measurement, above: Context, below: Context) -> float:
+    one, other = near(measured, above, below).values.tolist()
+    return float(one - other) / (2.0 * STEP)
+
+
 @pytest.mark.parametrize(
     ("metric", "options"),
     [
@@ -243,18 +255,19 @@ def test_region_that_moves_along() -> None:
     ],
 )
 def test_metrics_near(metric: str, options: dict[str, Any]) -> None:
-    """A measurement's ``near`` is the measurement itself at its design, and its slope elsewhere."""
+    """A measurement says of its own design what it is, and of others its slope."""
     parameters = {"db": 0.178, "dp": 0.06, "f": 0.198, "r": 0.209, "k": 2.0}
 
     def context(share: float) -> Context:
         return Context(*machine("uru", with_change(parameters, "f", 0, share)), None, 1e-3, 9)
 
     measured = METRICS[metric].compute(context(0.0), options)
-    assert measured.near is not None
-    assert measured.near(context(0.0)) == measured
+    own = near(measured, context(0.0))
+    assert (own.values.tolist(), own.errors.tolist()) == ([measured.value], [measured.error])
     above, below = (METRICS[metric].compute(context(h), options).value for h in (1e-5, -1e-5))
-    near = [measured.near(context(h)).value for h in (STEP, -STEP)]
-    assert (near[0] - near[1]) / (2.0 * STEP) == pytest.approx((above - below) / 2e-5, rel=1e-5)
+    assert slope_near(measured, context(STEP), context(-STEP)) == pytest.approx(
+        (above - below) / 2e-5, rel=1e-5
+    )
 
 
 MEANS = [
@@ -280,13 +293,14 @@ def test_means_near(metric: str, over: str, norm: str) -> None:
         return Context(built, mode, place(shape, (0.2 + share, 0.18, 0.22)), 1e-3, 9)
 
     measured = METRICS[metric].compute(context("f", 0.0), options)
-    assert measured.near is not None
-    own = measured.near(context("f", 0.0))
-    assert (own.value, own.error) == pytest.approx((measured.value, measured.error), rel=1e-12, abs=1e-14)
+    own = near(measured, context("f", 0.0))
+    assert own.values == pytest.approx(measured.value, rel=1e-12)
+    assert own.errors == pytest.approx(measured.error, rel=1e-12, abs=1e-14)
     for length in ("db", "f", "r", "k"):
         above, below = (METRICS[metric].compute(context(length, h), options).value for h in (1e-5, -1e-5))
-        near = [measured.near(context(length, h)).value for h in (STEP, -STEP)]
-        assert (near[0] - near[1]) / (2.0 * STEP) == pytest.approx((above - below) / 2e-5, rel=1e-4, abs=1e-6)
+        assert slope_near(measured, context(length, STEP), context(length, -STEP)) == pytest.approx(
+            (above - below) / 2e-5, rel=1e-4, abs=1e-6
+        )
 
 
 @pytest.mark.parametrize("metric", ["conditioning_mean", "conditioning_share", "robot_size"])
@@ -302,11 +316,9 @@ def test_means_of_every_mechanism(name: str, metric: str) -> None:
 
     for length, limb in each_length(name, parameters)[:4]:
         measured = METRICS[metric].compute(context(length, limb, 0.0), options)
-        assert measured.near is not None
         above, below = (
             METRICS[metric].compute(context(length, limb, h), options).value for h in (1e-5, -1e-5)
         )
-        near = [measured.near(context(length, limb, h)).value for h in (STEP, -STEP)]
-        assert (near[0] - near[1]) / (2.0 * STEP) == pytest.approx(
-            (above - below) / 2e-5, abs=1e-6 * max(1.0, measured.value)
-        )
+        assert slope_near(
+            measured, context(length, limb, STEP), context(length, limb, -STEP)
+        ) == pytest.approx((above - below) / 2e-5, abs=1e-6 * max(1.0, measured.value))

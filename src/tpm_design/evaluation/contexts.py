@@ -12,6 +12,8 @@ from tpm_design.problem import Design, Problem
 from tpm_design.workspace.region_geometry import PlacedRegion, place
 from tpm_design.workspace.regions import Points
 
+Pose = tuple[float, float, float]
+
 
 def design_context(problem: Problem, design: Design) -> Context:
     """The mechanism, mode and placed region of one design. Raises ParameterError where it cannot be."""
@@ -68,6 +70,6 @@ def offset_context(
         return error.what
 
 
-def pose_region(context: Context, pose: tuple[float, float, float]) -> PlacedRegion:
+def pose_region(context: Context, pose: Pose) -> PlacedRegion:
     """One pose of the context's region, given about its centre."""
     return place(Points((pose,)), context.placed.centre)

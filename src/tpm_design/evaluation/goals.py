@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
-from tpm_design.metrics.base import UNDEFINED, Measurement
+import numpy as np
+
+from tpm_design.metrics.base import UNDEFINED, FloatArray, Measurement
 from tpm_design.metrics.context import Context
+from tpm_design.metrics.neighbourhood import Neighbourhood
 from tpm_design.problem import Goal
+
+Number = TypeVar("Number", float, FloatArray)
 
 UNDEFINED_VIOLATION = 1.0
 """What a goal without a value adds to the violation."""
@@ -33,13 +39,38 @@ def slack_pieces(goal: Goal, measurement: Measurement) -> tuple[float, ...]:
     metric's unit, or as the metric defines them where its value is flat."""
     if UNDEFINED in measurement.notes:
         return (-UNDEFINED_VIOLATION * goal.metric.scale,)
-    if measurement.full_slacks and goal.minimum is not None and goal.minimum >= 1.0:
+    if measurement.full_slacks and _asks_for_all(goal):
         return measurement.full_slacks
-    return tuple(_slack(goal, measurement, value) for value in measurement.pieces or (measurement.value,))
+    return tuple(
+        least + measurement.depth if least < 0.0 else least
+        for least in (
+            min(_distances(goal, value, measurement.error))
+            for value in measurement.pieces or (measurement.value,)
+        )
+    )
 
 
-def _slack(goal: Goal, measurement: Measurement, value: float) -> float:
-    below = math.inf if goal.minimum is None else value - measurement.error - goal.minimum
-    above = math.inf if goal.maximum is None else goal.maximum - value - measurement.error
-    least = min(below, above)
-    return least + measurement.depth if least < 0.0 else least
+def slacks_near(goal: Goal, measurement: Measurement, designs: Neighbourhood) -> FloatArray | None:
+    """As ``slack_pieces``, of N neighbouring designs (N, P); None where nothing is known of them."""
+    if UNDEFINED in measurement.notes:
+        return np.full((len(designs.contexts), 1), -UNDEFINED_VIOLATION * goal.metric.scale)
+    if measurement.near is None:
+        return None
+    near = measurement.near(designs)
+    if near.full_slacks is not None and _asks_for_all(goal):
+        return near.full_slacks
+    values = near.values[:, None] if near.pieces is None else near.pieces
+    errors, depths = (np.reshape(each, (-1, 1)) for each in (near.errors, near.depths))
+    least = np.minimum.reduce(_distances(goal, values, errors))
+    return np.asarray(np.where(least < 0.0, least + depths, least))
+
+
+def _asks_for_all(goal: Goal) -> bool:
+    return goal.minimum is not None and goal.minimum >= 1.0
+
+
+def _distances(goal: Goal, value: Number, error: Number) -> list[Number]:
+    """To each bound, less the error."""
+    below = [] if goal.minimum is None else [value - error - goal.minimum]
+    above = [] if goal.maximum is None else [goal.maximum - value - error]
+    return below + above

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from tpm_design.evaluation.contexts import offset_context, pose_region
-from tpm_design.evaluation.goals import UNDEFINED_VIOLATION, measure, slack_pieces
-from tpm_design.metrics.base import Measurement
+import numpy as np
+
+from tpm_design.evaluation.contexts import Pose, offset_context, pose_region
+from tpm_design.evaluation.goals import UNDEFINED_VIOLATION, measure, slack_pieces, slacks_near
+from tpm_design.metrics.base import FloatArray, Measurement
 from tpm_design.metrics.context import Context
+from tpm_design.metrics.neighbourhood import Neighbourhood
 from tpm_design.problem import Goal, Problem, Sample
 
 
@@ -53,31 +56,38 @@ def sampled_machines(problem: Problem, context: Context, nominal: Mapping[str, M
     return Sampled(pieces, reasons, tuple(measured))
 
 
-def samples_near(problem: Problem, context: Context, sampled: Sampled) -> dict[str, tuple[float, ...] | None]:
-    """As ``Sampled.pieces`` next to the design; None where it is not known."""
+def samples_near(
+    problem: Problem, designs: Neighbourhood, sampled: Sampled
+) -> dict[str, list[FloatArray] | None]:
+    """Of N designs next to the one that was ``sampled`` its pieces, (N, P) for each sample of a constraint;
+    None where they are not known."""
     goals = {goal.label: goal for goal in problem.constraints}
-    machines = _Machines(problem, context)
-    found: dict[str, tuple[float, ...] | None] = {}
+    machines = _MachinesNear(problem, designs)
+    found: dict[str, list[FloatArray] | None] = {}
     for sample, judged in zip(problem.samples, sampled.measured, strict=False):
-        goal, before = goals[sample.label], found.get(sample.label, ())
-        slacks: tuple[float, ...] | None = (-UNDEFINED_VIOLATION * goal.metric.scale,)
-        if judged:
-            slacks = _sample_near(goal, sample, judged, machines.of(sample))
-        found[sample.label] = None if before is None or slacks is None else before + slacks
+        before = found.get(sample.label, [])
+        slacks = _sample_near(goals[sample.label], sample, judged, machines)
+        found[sample.label] = None if before is None or slacks is None else [*before, slacks]
     return found
 
 
 def _sample_near(
-    goal: Goal, sample: Sample, judged: Sequence[Measurement], machine: Context | str
-) -> tuple[float, ...] | None:
-    if isinstance(machine, str) or any(measurement.near is None for measurement in judged):
+    goal: Goal, sample: Sample, judged: Sequence[Measurement], machines: _MachinesNear
+) -> FloatArray | None:
+    if not judged:
+        return np.full((machines.count, 1), -UNDEFINED_VIOLATION * goal.metric.scale)
+    there = machines.of(sample)
+    slacks = None if there is None else slacks_near(goal, judged[0], there)
+    if there is None or slacks is None or sample.pose is None:
+        return None if slacks is None else slacks - sample.margin
+    at_pose = slacks_near(goal, judged[1], _at_pose(there, sample.pose))
+    if at_pose is None:
         return None
-    seen: list[Measurement] = []
-    for measurement in judged:
-        region = pose_region(machine, sample.pose) if seen and sample.pose is not None else machine.region
-        if measurement.near is not None:
-            seen.append(measurement.near(replace(machine, region=region)))
-    return _sample_slacks(goal, sample, seen)
+    return np.hstack([slacks, at_pose.min(axis=1, keepdims=True)]) - sample.margin
+
+
+def _at_pose(designs: Neighbourhood, pose: Pose) -> Neighbourhood:
+    return Neighbourhood(tuple(replace(c, region=pose_region(c, pose)) for c in designs.contexts))
 
 
 def _sample_slacks(goal: Goal, sample: Sample, judged: Sequence[Measurement]) -> tuple[float, ...]:
@@ -88,17 +98,42 @@ def _sample_slacks(goal: Goal, sample: Sample, judged: Sequence[Measurement]) ->
     return tuple(value - sample.margin for value in values)
 
 
+MachineKey = tuple[tuple[str, tuple[float, ...]], ...]
+
+
+def _machine_key(sample: Sample) -> MachineKey:
+    return tuple(sorted(sample.offsets.items()))
+
+
 class _Machines:
     """The machines of a problem's samples in the place of one design; samples of the same machine share what
     their metrics need."""
 
     def __init__(self, problem: Problem, context: Context) -> None:
         self._problem, self._nominal = problem, context
-        self._found: dict[tuple[tuple[str, tuple[float, ...]], ...], Context | str] = {(): context}
+        self._found: dict[MachineKey, Context | str] = {(): context}
 
     def of(self, sample: Sample) -> Context | str:
         """The machine's context, or why there is no such machine."""
-        machine = tuple(sorted(sample.offsets.items()))
+        machine = _machine_key(sample)
         if machine not in self._found:
             self._found[machine] = offset_context(self._problem, self._nominal, sample.offsets)
+        return self._found[machine]
+
+
+class _MachinesNear:
+    """As ``_Machines``, in the places of N designs next to one another."""
+
+    def __init__(self, problem: Problem, designs: Neighbourhood) -> None:
+        self._problem, self._nominal = problem, designs
+        self.count = len(designs.contexts)
+        self._found: dict[MachineKey, Neighbourhood | None] = {(): designs}
+
+    def of(self, sample: Sample) -> Neighbourhood | None:
+        """The machine's contexts, None where one of them cannot be."""
+        machine = _machine_key(sample)
+        if machine not in self._found:
+            contexts = [offset_context(self._problem, c, sample.offsets) for c in self._nominal.contexts]
+            possible = tuple(context for context in contexts if isinstance(context, Context))
+            self._found[machine] = Neighbourhood(possible) if len(possible) == self.count else None
         return self._found[machine]

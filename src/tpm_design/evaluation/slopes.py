@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from tpm_design.errors import ParameterError
 from tpm_design.evaluation.contexts import neighbouring_contexts
-from tpm_design.evaluation.goals import slack_pieces
+from tpm_design.evaluation.goals import slacks_near
 from tpm_design.evaluation.samples import Sampled, samples_near
-from tpm_design.evaluation.violation import objective_pieces
-from tpm_design.metrics.base import UNDEFINED, Measurement
+from tpm_design.metrics.base import UNDEFINED, FloatArray, Measurement
 from tpm_design.metrics.context import Context
+from tpm_design.metrics.neighbourhood import Neighbourhood
 from tpm_design.problem import Design, Problem
 
 
@@ -42,39 +43,37 @@ def slopes_along(
     neighbours: Neighbours,
 ) -> Slopes:
     """Difference quotients of what a design's measurements say of its neighbours."""
-    here = _seen_near(problem, context, measured, sampled)
     try:
         beside = neighbouring_contexts(problem, context, design, [n.design for n in neighbours])
-        there = [_seen_near(problem, other, measured, sampled) for other in beside]
+        # the design itself is seen in the same way
+        seen = _seen_near(problem, Neighbourhood((context, *beside)), measured, sampled)
     except ParameterError:
         return {}
+    steps = np.array([neighbour.step for neighbour in neighbours])
     slopes = {}
-    for label, values in here.items():
-        found = [
-            [(after - before) / neighbour.step for before, after in zip(values, seen[label], strict=True)]
-            for neighbour, seen in zip(neighbours, there, strict=True)
-        ]
-        rows = tuple(zip(*found, strict=True)) if found else ((),) * len(values)
-        if all(math.isfinite(slope) for row in rows for slope in row):
-            slopes[label] = rows
+    for label, values in seen.items():
+        found = (values[1:] - values[0]).T / steps
+        if np.isfinite(found).all():
+            slopes[label] = tuple(map(tuple, found.tolist()))
     return slopes
 
 
 def _seen_near(
-    problem: Problem, context: Context, measured: Mapping[str, Measurement], sampled: Sampled
-) -> dict[str, tuple[float, ...]]:
-    """Pieces of objectives and constraints as the measurements of a design next to this one tell them."""
-    found: dict[str, tuple[float, ...]] = {}
+    problem: Problem, designs: Neighbourhood, measured: Mapping[str, Measurement], sampled: Sampled
+) -> dict[str, FloatArray]:
+    """Pieces (N, P) of objectives and constraints of each design."""
+    found: dict[str, FloatArray] = {}
     for goal in problem.objectives:
-        near = measured[goal.label].near
-        if near is not None:
-            there = near(context)
-            in_pieces = objective_pieces(problem, {goal.label: there}).get(goal.label)
-            # what is undefined is level
-            found[goal.label] = (0.0,) if UNDEFINED in there.notes else in_pieces or (there.value,)
-    of_samples = samples_near(problem, context, sampled)
+        here, near = measured[goal.label], measured[goal.label].near
+        if UNDEFINED in here.notes:
+            found[goal.label] = np.zeros((len(designs.contexts), 1))
+        elif near is not None:
+            there = near(designs)
+            pieces = None if len(problem.objectives) == 1 else there.pieces
+            found[goal.label] = there.values[:, None] if pieces is None else pieces
+    of_samples = samples_near(problem, designs, sampled)
     for goal in problem.constraints:
-        near, more = measured[goal.label].near, of_samples.get(goal.label, ())
-        if near is not None and more is not None:
-            found[goal.label] = slack_pieces(goal, near(context)) + more
+        slacks, more = slacks_near(goal, measured[goal.label], designs), of_samples.get(goal.label, [])
+        if slacks is not None and more is not None:
+            found[goal.label] = np.hstack([slacks, *more])
     return found

@@ -6,9 +6,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 if TYPE_CHECKING:
     from tpm_design.mechanisms.base import MechanismKind
     from tpm_design.metrics.context import Context
+    from tpm_design.metrics.neighbourhood import Neighbourhood
+
+FloatArray = NDArray[np.float64]
 
 Sense = Literal["maximize", "minimize"]
 UNDEFINED = "undefined"
@@ -39,6 +45,19 @@ class Option:
 
 
 @dataclass(frozen=True)
+class Nearby:
+    """What a measurement says of N neighbouring designs, exact to first order: ``values`` (N,) and what
+    ``Measurement`` calls so, ``pieces`` (N, P), ``errors`` and ``depths`` (N,), 0 throughout where they are
+    left out, ``full_slacks`` (N, P). A value that is not known is NaN."""
+
+    values: FloatArray
+    pieces: FloatArray | None = None
+    errors: FloatArray | float = 0.0
+    depths: FloatArray | float = 0.0
+    full_slacks: FloatArray | None = None
+
+
+@dataclass(frozen=True)
 class Measurement:
     """A metric's value in SI units with its numeric error.
 
@@ -46,8 +65,8 @@ class Measurement:
     and ``full_slacks`` replace the slack of a constraint that asks for the full score 1 (coverage).
     ``pieces``: values whose least (of a metric to be large) or greatest is ``value``; like ``full_slacks``
     smoother in the design than their minimum. ``notes`` are extra columns, such as which
-    locus was nearest. ``near(context)``: the measurement of a neighbouring design, exact to first order,
-    taken where this one's extremes are; a value that is not known so is NaN, ``near`` None where nothing is.
+    locus was nearest. ``near``: what this says of neighbouring designs, taken where its own extremes are;
+    None where nothing is known of them.
     """
 
     value: float
@@ -56,12 +75,12 @@ class Measurement:
     full_slacks: tuple[float, ...] = ()
     notes: Mapping[str, str] = field(default_factory=dict)
     pieces: tuple[float, ...] = ()
-    near: Callable[[Context], Measurement] | None = field(default=None, compare=False, repr=False)
+    near: Callable[[Neighbourhood], Nearby] | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def undefined(cls, reason: str) -> Measurement:
         """No value: the design is infeasible for the stated reason, and so are its neighbours."""
-        return cls(float("nan"), notes={UNDEFINED: reason}, near=lambda _: cls.undefined(reason))
+        return cls(float("nan"), notes={UNDEFINED: reason})
 
 
 def never_refused(kind: MechanismKind, limits: Mapping[str, Any]) -> str | None:

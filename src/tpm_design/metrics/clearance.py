@@ -10,17 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from tpm_design.metrics.base import Measurement, Metric, of_positions
+from tpm_design.metrics.base import Measurement, Metric, Nearby, of_positions
 from tpm_design.metrics.context import Context
 from tpm_design.metrics.following import (
     extreme_measurement,
     in_one_piece,
+    in_pieces,
     out_of_reach,
     pieces_of,
     reach_shortfall,
     sides_of,
     span_measurement,
 )
+from tpm_design.metrics.neighbourhood import Neighbourhood
 from tpm_design.workspace.indices import CLEARANCE, LEGS, SERIAL, Index
 from tpm_design.workspace.loci import LocusDistance
 from tpm_design.workspace.locus_motion import LocusMotion, locus_motion
@@ -43,17 +45,16 @@ def _locus_distance(name: str) -> Callable[[Context, Mapping[str, Any]], Measure
         if found.pose is None:
             return replace(span_measurement(context, context.size), notes={"locus": "none"})
         here = Measurement(found.value, found.error, notes={"locus": name})
-        return replace(here, near=_MovingLocus(here, context, part, found).near)
+        return replace(here, near=_MovingLocus(context, part, found).near)
 
     return compute
 
 
 @dataclass(frozen=True)
 class _MovingLocus:
-    """The distance to a locus, ``here`` as it was ``found``, for neighbouring designs. How the locus moves is
-    found when one first asks."""
+    """The distance to a locus, as it was ``found`` in a context, for neighbouring designs. How the locus
+    moves is found when one first asks."""
 
-    here: Measurement
     context: Context
     part: int
     found: LocusDistance
@@ -63,10 +64,12 @@ class _MovingLocus:
         own = self.context
         return locus_motion(own.mechanism, own.mode, own.placed, self.part, self.found)
 
-    def near(self, neighbour: Context) -> Measurement:
-        if self._motion is None:
-            return replace(self.here, value=math.nan)
-        return replace(self.here, value=self._motion.distance(neighbour.mechanism, neighbour.placed))
+    def near(self, neighbours: Neighbourhood) -> Nearby:
+        return Nearby(neighbours.each(self._distance), errors=self.found.error)
+
+    def _distance(self, neighbour: Context) -> float:
+        motion = self._motion
+        return math.nan if motion is None else motion.distance(neighbour.mechanism, neighbour.placed)
 
 
 def _boundary_distance(context: Context, options: Mapping[str, Any]) -> Measurement:
@@ -84,32 +87,23 @@ def _singularity_margin_min(context: Context, options: Mapping[str, Any]) -> Mea
     value, error = min(margins)
     of_serial, of_sides = pieces_of(context, Index(SERIAL), serial), sides_of(context)
 
-    def near(other: Context) -> Measurement:
-        return _margin(min(float(of_serial(other).min()), float(of_sides(other).min())), error)
+    def near(others: Neighbourhood) -> Nearby:
+        values = np.minimum(of_serial(others).min(axis=1), of_sides(others).min(axis=(1, 2)))
+        return Nearby(np.maximum(0.0, values), errors=error, depths=np.minimum(0.0, values))
 
-    return replace(_margin(value, error), near=near)
-
-
-def _margin(value: float, error: float) -> Measurement:
-    return Measurement(max(0.0, value), error, depth=min(0.0, value))
+    return Measurement(max(0.0, value), error, depth=min(0.0, value), near=near)
 
 
 def _link_clearance(context: Context, options: Mapping[str, Any]) -> Measurement:
     if not context.reachable:
         return Measurement.undefined("the region is not reachable")
-    found = extreme_measurement(context, Index(CLEARANCE))
-    unheld = found.near
+    index = Index(CLEARANCE)
+    found = context.least(index)
+    moving = pieces_of(context, index, found)
     # links that cross are 0 apart, and so they are in every neighbouring design
     apart = np.array(found.pieces) + 2.0 * context.mechanism.geometry.link_radius
     crossed = apart < CROSSED * context.mechanism.reach_radius()
-    if unheld is None or not crossed.any():
-        return found
-
-    def near(other: Context) -> Measurement:
-        pieces = np.where(crossed, found.pieces, unheld(other).pieces)
-        return replace(found, value=float(pieces.min()), pieces=tuple(pieces.tolist()))
-
-    return replace(found, near=near)
+    return in_pieces(found, 1.0, lambda others: np.where(crossed, found.pieces, moving(others)))
 
 
 def _distance(name: str, condition: str) -> Metric:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, TypeVar
 
@@ -11,9 +11,9 @@ import numpy as np
 
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
-from tpm_design.metrics.base import Measurement, Metric, Option
+from tpm_design.metrics.base import Measurement, Metric, Nearby, Option
 from tpm_design.metrics.context import Context
-from tpm_design.metrics.following import extreme_measurement, out_of_reach, singular
+from tpm_design.metrics.following import by_two_orders, extreme_measurement, out_of_reach, singular
 from tpm_design.metrics.moving_fields import MovingFields
 from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.averages import GAUSS_NODES, Averages, conditioning_averages
@@ -96,7 +96,8 @@ def _at_points(context: Context, options: Mapping[str, Any]) -> np.ndarray:
 
 def _mean(context: Context, options: Mapping[str, Any]) -> Measurement:
     if options["over"] == "region" and context.placed.form == POINTS:
-        return replace(_mean_at_points(options, context), near=partial(_mean_at_points, options))
+        mean = partial(_mean_at_points, options)
+        return Measurement(mean(context), near=lambda others: Nearby(others.each(mean)))
     fields = _fields(context, options)
     found = _averages(context, options, fields)
     fine, coarse = (
@@ -104,12 +105,12 @@ def _mean(context: Context, options: Mapping[str, Any]) -> Measurement:
         for each, field in zip(found, fields, strict=True)
     )
     moving = _moving(context, options)
-    near = None if moving is None else MovingConditioning(moving, options, found).mean_near
+    near = None if moving is None else by_two_orders(MovingConditioning(moving, options, found).means_near)
     return Measurement(fine, abs(fine - coarse), near=near)
 
 
-def _mean_at_points(options: Mapping[str, Any], context: Context) -> Measurement:
-    return Measurement(float(_at_points(context, options).mean()))
+def _mean_at_points(options: Mapping[str, Any], context: Context) -> float:
+    return float(_at_points(context, options).mean())
 
 
 def _share(context: Context, options: Mapping[str, Any]) -> Measurement:
@@ -122,7 +123,7 @@ def _share(context: Context, options: Mapping[str, Any]) -> Measurement:
         _share_of(options, each.above, each.volume, field) for each, field in zip(found, fields, strict=True)
     )
     moving = _moving(context, options)
-    near = None if moving is None else MovingConditioning(moving, options, found).share_near
+    near = None if moving is None else by_two_orders(MovingConditioning(moving, options, found).shares_near)
     return Measurement(fine, abs(fine - coarse), near=near)
 
 
@@ -159,10 +160,10 @@ class MovingConditioning:
         motor = machine.motor_weight(self.options["drive"])
         return machine, self.moving.mode, self.options["norm"] == "frobenius", motor
 
-    def mean_near(self, neighbour: Context) -> Measurement:
+    def means_near(self, neighbour: Context) -> tuple[float, float]:
         return self._shares(integral_near, self._means, neighbour)
 
-    def share_near(self, neighbour: Context) -> Measurement:
+    def shares_near(self, neighbour: Context) -> tuple[float, float]:
         return self._shares(volume_above_near, self._levels, neighbour)
 
     def _shares(
@@ -170,14 +171,14 @@ class MovingConditioning:
         integral: Callable[[Moving, Mechanism, RayField], float],
         moving: Sequence[Moving],
         neighbour: Context,
-    ) -> Measurement:
+    ) -> tuple[float, float]:
         fine, coarse = (
             _share_of(
                 self.options, integral(one, neighbour.mechanism, field), float(np.sum(field.volumes)), field
             )
             for one, field in zip(moving, neighbour.moved(self.moving), strict=True)
         )
-        return Measurement(fine, abs(fine - coarse))
+        return fine, coarse
 
 
 def _fields(context: Context, options: Mapping[str, Any]) -> tuple[RayField, RayField]:

@@ -13,7 +13,7 @@ from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.mechanisms.pointwise import kept_sides
 from tpm_design.metrics.moving_fields import MovingFields
 from tpm_design.workspace.aspects import RayField, locate, located, mode_fields, region_fields
-from tpm_design.workspace.extremes import Extreme, extremes_over_region
+from tpm_design.workspace.extremes import Extreme, IndicesNear, extremes_over_region
 from tpm_design.workspace.fold_clearance import fold_clearance
 from tpm_design.workspace.indices import DETERMINANT, EXTENT, REACH, Index
 from tpm_design.workspace.loci import LocusDistance, locus_distance
@@ -114,6 +114,11 @@ class Context:
             return replace(found, pieces=pieces)
         return replace(found, value=nearest.value, pose=nearest.pose, pieces=pieces)
 
+    @cached_property
+    def reach_near(self) -> IndicesNear:
+        """Reach at the poses of its pieces, for neighbouring designs."""
+        return IndicesNear([Index(REACH)], self.reach.piece_poses[None, :, :], self.placed.centre)
+
     @property
     def reachable(self) -> bool:
         """Whether the whole region is reachable in the mode."""
@@ -147,6 +152,12 @@ class Context:
             )
             for index, found in zip(indices, self.extremes(*indices), strict=True)
         )
+
+    @cached_property
+    def sides_near(self) -> IndicesNear:
+        """Every determinant at the poses of its pieces, for neighbouring designs."""
+        poses = np.array([side.extreme.piece_poses for side in self.sides])
+        return IndicesNear([side.index for side in self.sides], poses, self.placed.centre)
 
     def side_driven_by(self, drive: str) -> Sides:
         """The determinant whose zero takes control from these actuators: W for motors, V for joints."""

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.metrics.base import Measurement, Metric, Option
+from tpm_design.metrics.base import Measurement, Metric, Nearby, Option
 from tpm_design.metrics.context import Context
-from tpm_design.metrics.following import span_measurement
+from tpm_design.metrics.following import by_two_orders, span_measurement
 from tpm_design.metrics.moving_fields import MovingFields
 from tpm_design.workspace.extents import extent_of_segments, field_extent, outermost_segments
 from tpm_design.workspace.indices import ACTUATOR, Index
@@ -23,9 +23,11 @@ SOURCE = "by definition"
 
 
 def _total_link_length(context: Context, options: Mapping[str, Any]) -> Measurement:
-    return Measurement(
-        context.mechanism.total_link_length(), near=lambda other: _total_link_length(other, options)
-    )
+    return Measurement(_links(context), near=lambda others: Nearby(others.each(_links)))
+
+
+def _links(context: Context) -> float:
+    return context.mechanism.total_link_length()
 
 
 def _robot_size(context: Context, options: Mapping[str, Any]) -> Measurement:
@@ -43,11 +45,8 @@ def _size_over_aspect(context: Context) -> Measurement:
         return Measurement.undefined("the mode has no reachable pose")
     if coarse is None or context.moving_aspects is None:
         return Measurement(fine, fine)
-    return replace(_extent(fine, coarse), near=_MovingExtent(context.moving_aspects).near)
-
-
-def _extent(fine: float, coarse: float) -> Measurement:
-    return Measurement(fine, abs(fine - coarse))
+    moving = _MovingExtent(context.moving_aspects)
+    return Measurement(fine, abs(fine - coarse), near=by_two_orders(moving.fine_and_coarse))
 
 
 @dataclass(frozen=True)
@@ -64,14 +63,13 @@ class _MovingExtent:
             outermost_segments(machine.geometry, mode.signs, b.field) for b in self.moving.boundaries
         )
 
-    def near(self, neighbour: Context) -> Measurement:
+    def fine_and_coarse(self, neighbour: Context) -> tuple[float, float]:
         geometry, signs = neighbour.mechanism.geometry, neighbour.mode.signs
-        return _extent(
-            *(
-                extent_of_segments(geometry, signs, field, segments)
-                for field, segments in zip(neighbour.moved(self.moving), self._outermost, strict=True)
-            )
+        fine, coarse = (
+            extent_of_segments(geometry, signs, field, segments)
+            for field, segments in zip(neighbour.moved(self.moving), self._outermost, strict=True)
         )
+        return fine, coarse
 
 
 def _actuator_range(context: Context, options: Mapping[str, Any]) -> Measurement:

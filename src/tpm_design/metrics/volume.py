@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from tpm_design.metrics.base import Measurement, Metric, Option, of_positions
+from tpm_design.metrics.base import FloatArray, Measurement, Metric, Nearby, Option, of_positions
 from tpm_design.metrics.context import Context
-from tpm_design.metrics.following import reach_of, sides_of, span_measurement
+from tpm_design.metrics.following import by_two_orders, reach_of, sides_of, span_measurement
 from tpm_design.metrics.moving_fields import MovingFields
+from tpm_design.metrics.neighbourhood import Neighbourhood
 from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.region_geometry import POINTS
 from tpm_design.workspace.volume import selected_volume
+
+Number = TypeVar("Number", float, FloatArray | float)
 
 RAYS = "volume by Gauss–Legendre rays, ARCHITECTURE.md"
 MARGIN = Option(
@@ -29,7 +31,7 @@ def _reachable_volume(context: Context, options: Mapping[str, Any]) -> Measureme
     fields = context.mode_rays(0.0, sided=False)
     fine, coarse = (selected_volume(field, largest_only=False) for field in fields)
     moving = MovingFields(context.mechanism, context.mode, fields, (None, None), None)
-    return Measurement(fine, abs(fine - coarse), near=partial(_volume_near, moving))
+    return Measurement(fine, abs(fine - coarse), near=by_two_orders(partial(_volumes_near, moving)))
 
 
 def _singularity_free_volume(context: Context, options: Mapping[str, Any]) -> Measurement:
@@ -45,13 +47,13 @@ def _singularity_free_volume(context: Context, options: Mapping[str, Any]) -> Me
         moving = context.moving_aspects if margin == 0.0 and home is None else None
         if moving is None:
             moving = MovingFields(context.mechanism, context.mode, fields, (one, other), margin)
-        near = partial(_volume_near, moving)
+        near = by_two_orders(partial(_volumes_near, moving))
     return Measurement(fine, abs(fine - coarse), near=near)
 
 
-def _volume_near(moving: MovingFields, neighbour: Context) -> Measurement:
+def _volumes_near(moving: MovingFields, neighbour: Context) -> tuple[float, float]:
     fine, coarse = (float(np.sum(field.volumes)) for field in neighbour.moved(moving))
-    return Measurement(fine, abs(fine - coarse))
+    return fine, coarse
 
 
 def _workspace_ratio(context: Context, options: Mapping[str, Any]) -> Measurement:
@@ -60,14 +62,21 @@ def _workspace_ratio(context: Context, options: Mapping[str, Any]) -> Measuremen
         return Measurement.undefined("the region is not reachable, so the robot's size is not known")
     size = span_measurement(context, context.size)
     of_volume, of_size = volume.near, size.near
-    if of_volume is None or of_size is None:
-        return _ratio(volume, size)
-    return replace(_ratio(volume, size), near=lambda other: _ratio(of_volume(other), of_size(other)))
-
-
-def _ratio(volume: Measurement, size: Measurement) -> Measurement:
     ratio = volume.value / size.value**3
-    return Measurement(ratio, volume.error / size.value**3 + 3.0 * ratio * size.error / size.value)
+    error = _ratio_error(ratio, volume.error, size.value, size.error)
+    if of_volume is None or of_size is None:
+        return Measurement(ratio, error)
+
+    def near(others: Neighbourhood) -> Nearby:
+        volumes, sizes = of_volume(others), of_size(others)
+        ratios = volumes.values / sizes.values**3
+        return Nearby(ratios, errors=_ratio_error(ratios, volumes.errors, sizes.values, sizes.errors))
+
+    return Measurement(ratio, error, near=near)
+
+
+def _ratio_error(ratio: Number, volume_error: Number, size: Number, size_error: Number) -> Number:
+    return volume_error / size**3 + 3.0 * ratio * size_error / size
 
 
 def _coverage(context: Context, options: Mapping[str, Any]) -> Measurement:
@@ -77,11 +86,10 @@ def _coverage(context: Context, options: Mapping[str, Any]) -> Measurement:
     worst = min(slacks)
     of_reach, of_sides = reach_of(context), sides_of(context)
 
-    def near(other: Context) -> Measurement:
-        shares = of_reach(other) / other.mechanism.reach_radius()
-        values = np.concatenate([shares, of_sides(other).ravel()])
-        share = 1.0 if worst >= 0.0 else math.nan
-        return Measurement(share, full_slacks=tuple(values.tolist()))
+    def near(others: Neighbourhood) -> Nearby:
+        shares, sides = of_reach(others) / others.radii[:, None], of_sides(others)
+        values = np.full(len(shares), 1.0 if worst >= 0.0 else math.nan)
+        return Nearby(values, full_slacks=np.hstack([shares, sides.reshape(len(sides), -1)]))
 
     if worst >= 0.0:
         return Measurement(1.0, 0.0, full_slacks=slacks, near=near)

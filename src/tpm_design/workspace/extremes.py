@@ -159,16 +159,14 @@ def _extremes(geometry, mode, region, indices, points, spacing):  # type: ignore
 
 
 @short_kernel
-def _near(geometry, mode, indices, offsets, centre):  # type: ignore[no-untyped-def]
-    """The index of each row of ``indices`` at its poses, given (K, P, 3) from ``centre``."""
-    out = np.empty(offsets.shape[:2])
+def _near(geometry, mode, indices, offsets, centre, out):  # type: ignore[no-untyped-def]
+    """Write the index of each row of ``indices`` at its poses, given (K, P, 3) from ``centre``."""
     for k in range(indices.shape[0]):
         sign = indices[k, 3]
         index = Index(int(indices[k, 0]), int(indices[k, 1]), indices[k, 2], sign)
         for n in range(offsets.shape[1]):
             x, y, z = offsets[k, n, 0] + centre[0], offsets[k, n, 1] + centre[1], offsets[k, n, 2] + centre[2]
             out[k, n] = sign * index_value(geometry, mode, index, x, y, z)
-    return out
 
 
 def extremes_over_region(
@@ -206,7 +204,11 @@ class IndicesNear:
         self._offsets = np.ascontiguousarray(poses) - np.array(centre)
 
     def values(
-        self, geometry: object, signs: object, centre: tuple[float, float, float]
+        self, machines: Sequence[tuple[object, object, tuple[float, float, float]]]
     ) -> NDArray[np.float64]:
-        """(K, P), in each index's unit, for a machine with the poses about another ``centre``."""
-        return np.asarray(_near(geometry, signs, self._table, self._offsets, centre))
+        """(N, K, P), in each index's unit, for machines (geometry, signs of the mode) with the poses about
+        centres of their own."""
+        found = np.empty((len(machines), *self._offsets.shape[:2]))
+        for (geometry, signs, centre), out in zip(machines, found, strict=True):
+            _near(geometry, signs, self._table, self._offsets, centre, out)
+        return found
