@@ -14,6 +14,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from pydantic_core import from_json, to_json
+
 from tpm_design.errors import UsageError, unwritable
 from tpm_design.evaluation.result import Cutoff, Evaluation
 from tpm_design.problem import Problem
@@ -118,7 +120,8 @@ def _summary_text(summary: Mapping[str, Any]) -> str:
 
 
 def _log_line(entry: Entry) -> str:
-    return json.dumps(entry_to_json(entry), ensure_ascii=False) + "\n"
+    # floats as exact as by json, in a fifth of its time
+    return to_json(entry_to_json(entry), inf_nan_mode="constants").decode() + "\n"
 
 
 def entry_to_json(entry: Entry) -> dict[str, Any]:
@@ -185,7 +188,7 @@ def read_run(folder: Path) -> StoredRun:
         if not line:
             continue
         try:
-            entries.append(entry_from_json(json.loads(line)))
+            entries.append(entry_from_json(from_json(line)))
         except (ValueError, KeyError, TypeError):
             if number == len(lines):
                 break
