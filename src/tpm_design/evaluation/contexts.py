@@ -32,7 +32,7 @@ def neighbouring_contexts(
     own = _parameters(problem, design)
     found = []
     for neighbour in neighbours:
-        values = _parameters(problem, neighbour)
+        values = {name: neighbour[name] for name in own}
         machine = context.mechanism if values == own else problem.kind.build(values, problem.limits)
         region = _region(problem, neighbour)
         found.append(Context(machine, context.mode, region, context.volume_rtol, context.region_samples))

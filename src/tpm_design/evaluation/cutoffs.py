@@ -8,7 +8,7 @@ from typing import Literal
 
 from tpm_design.evaluation.goals import scaled_objective
 from tpm_design.evaluation.result import Cutoff, Evaluation
-from tpm_design.evaluation.violation import shortfalls
+from tpm_design.evaluation.violation import constraint_pieces, shortfalls
 from tpm_design.metrics.base import Measurement
 from tpm_design.problem import Problem
 
@@ -23,7 +23,7 @@ def why_worse(problem: Problem, measured: Mapping[str, Measurement], cutoff: Cut
     """Why a design is worse than a cutoff, empty where that is not sure yet."""
     if cutoff is None:
         return ""
-    short = shortfalls(problem, measured, {})
+    short = shortfalls(problem, measured, constraint_pieces(problem, measured, {}))
     first = measured.get(problem.objectives[0].label)
     value = math.nan if first is None else first.value
     worse = _worse(problem, sum(short.values()), value, cutoff)

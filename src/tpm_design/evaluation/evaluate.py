@@ -89,7 +89,7 @@ def _judged(
     goals = (*problem.objectives, *problem.constraints, *problem.record)
     found = {goal.label: measured[goal.label] for goal in goals if goal.label in measured}
     pieces = constraint_pieces(problem, measured, sampled.pieces)
-    short = shortfalls(problem, measured, sampled.pieces)
+    short = shortfalls(problem, measured, pieces)
     missed = [label for label, value in short.items() if value > 0.0]
     status: Literal["feasible", "infeasible", "aborted"] = "infeasible" if missed else "feasible"
     if cutoff is not None:

@@ -28,10 +28,9 @@ def objective_pieces(problem: Problem, measured: Mapping[str, Measurement]) -> d
 
 
 def shortfalls(
-    problem: Problem, measured: Mapping[str, Measurement], sampled: Mapping[str, tuple[float, ...]]
+    problem: Problem, measured: Mapping[str, Measurement], pieces: Mapping[str, tuple[float, ...]]
 ) -> dict[str, float]:
-    """What each goal that was measured adds to the violation."""
-    pieces = constraint_pieces(problem, measured, sampled)
+    """What each goal that was measured adds to the violation. ``pieces``: of the constraints."""
     scales = {goal.label: goal.metric.scale for goal in problem.constraints}
     short = {label: max(0.0, -min(values)) / scales[label] for label, values in pieces.items()}
     for goal in problem.objectives:

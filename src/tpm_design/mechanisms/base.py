@@ -161,17 +161,20 @@ class MechanismKind:
     @property
     def centre_names(self) -> tuple[str, ...]:
         """The design quantities that place a region: one for each length of the pose, ``center_x`` …"""
-        return tuple(
-            f"center_{name}" for name, unit in zip(self.pose, self.pose_units, strict=True) if unit == "m"
-        )
+        return tuple(filter(None, self._placing))
 
     def centre(self, design: Mapping[str, float | str]) -> tuple[float, float, float]:
         """Coordinates of a region's centre: its lengths, and 0 for every angle."""
-        x, y, z = (
-            float(design[f"center_{name}"]) if unit == "m" else 0.0
+        x, y, z = (float(design[name]) if name else 0.0 for name in self._placing)
+        return x, y, z
+
+    @cached_property
+    def _placing(self) -> tuple[str, ...]:
+        """What places a region along each coordinate of the pose, empty for angles."""
+        return tuple(
+            f"center_{name}" if unit == "m" else ""
             for name, unit in zip(self.pose, self.pose_units, strict=True)
         )
-        return x, y, z
 
     def guard(self, drive: str) -> str:
         """The determinant whose zero takes control from the actuators of a drive."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ class RayField:
 
     ``origin``, ``scale``: pose = origin + t · scale · direction. ``component`` (S,): which connected set
     a segment belongs to. Of these sets: ``volumes`` (C,) in m³, ``sides`` (C,) the code of their segments,
-    ``middles`` (C, 3) the pose (m) in the middle of the longest one. ``whole`` (m³): volume of all the rays.
+    ``middles`` (C, 3) the pose (m) in the middle of the longest one. ``limits`` (N,): t at which rays end.
     """
 
     origin: tuple[float, float, float]
@@ -38,7 +38,13 @@ class RayField:
     volumes: NDArray[np.float64]
     sides: NDArray[np.int64]
     middles: NDArray[np.float64]
-    whole: float
+    limits: NDArray[np.float64]
+
+    @cached_property
+    def whole(self) -> float:
+        """Volume of all the rays (m³)."""
+        a, b, c = self.scale
+        return abs(a * b * c) * float(self.rays.weights @ self.limits**3) / 3.0
 
     def largest(self) -> int | None:
         """Index of the component of greatest volume."""
@@ -140,7 +146,6 @@ def _fields(
     )
     count = len(mechanism.kind.determinants)
     found = _two_fields(mechanism.geometry, mode.signs, sided, count, floor, origin, scale, fine, coarse)
-    cell = abs(scale[0] * scale[1] * scale[2])
     one, other = (
         RayField(
             origin=origin,
@@ -151,7 +156,7 @@ def _fields(
             volumes=volumes,
             sides=sides,
             middles=middles,
-            whole=cell * float(each.weights @ ends**3) / 3.0,
+            limits=ends,
         )
         for each, ends, (segments, component, volumes, sides, middles) in zip(
             rays, limits, found, strict=True

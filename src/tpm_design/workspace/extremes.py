@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,7 +182,7 @@ def extremes_over_region(
 
     ``points`` (N, 3): the region's lattice; ``spacing`` (m) between its poses.
     """
-    rows = _extremes(geometry, signs, region, _table(indices), points, spacing)
+    rows = _extremes(geometry, signs, region, _table(tuple(indices)), points, spacing)
     poses = rows[:, 5 + EIGHTHS :].reshape(-1, EIGHTHS, 3)
     return tuple(
         Extreme(row[0], row[1], (row[2], row[3], row[4]), tuple(row[5 : 5 + EIGHTHS]), where)
@@ -189,7 +190,8 @@ def extremes_over_region(
     )
 
 
-def _table(indices: Sequence[Index]) -> NDArray[np.float64]:
+@lru_cache(maxsize=256)
+def _table(indices: tuple[Index, ...]) -> NDArray[np.float64]:
     """As kernels take them (K, 4)."""
     return np.array(indices, dtype=np.float64).reshape(-1, 4)
 
@@ -200,7 +202,7 @@ class IndicesNear:
     def __init__(
         self, indices: Sequence[Index], poses: NDArray[np.float64], centre: tuple[float, float, float]
     ) -> None:
-        self._table = _table(indices)
+        self._table = _table(tuple(indices))
         self._offsets = np.ascontiguousarray(poses) - np.array(centre)
 
     def values(

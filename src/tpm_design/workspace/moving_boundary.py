@@ -345,7 +345,6 @@ def field_near(boundary: MovingBoundary, mechanism: Mechanism, origin: Triple, s
         scale=scale,
         segments=replace(field.segments, start=start, end=end),
         volumes=cell * volumes,
-        whole=field.whole * cell / abs(math.prod(field.scale)),
     )
 
 

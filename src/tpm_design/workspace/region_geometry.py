@@ -33,7 +33,7 @@ def place(shape: Shape, centre: tuple[float, float, float]) -> PlacedRegion:
     form, (a, b, c) = _form_and_half(shape, points)
     x, y, z = centre
     at = float(x), float(y), float(z)
-    return PlacedRegion(form, at, (float(a), float(b), float(c)), points + np.array(at))
+    return PlacedRegion(form, at, (float(a), float(b), float(c)), points + at if points.size else points)
 
 
 def _form_and_half(shape: Shape, points: NDArray[np.float64]) -> tuple[int, Sequence[float]]:
