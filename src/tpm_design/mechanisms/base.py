@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
+from tpm_design.computed_once import computed_once
 from tpm_design.mechanisms.outer_reach import OuterReach
 
 if TYPE_CHECKING:
@@ -168,7 +168,7 @@ class MechanismKind:
         x, y, z = (float(design[name]) if name else 0.0 for name in self._placing)
         return x, y, z
 
-    @cached_property
+    @computed_once
     def _placing(self) -> tuple[str, ...]:
         """What places a region along each coordinate of the pose, empty for angles."""
         return tuple(
@@ -184,14 +184,14 @@ class MechanismKind:
         """The parameter that ``name`` sets (``f`` or ``f2``), or None."""
         return self._by_name.get(name)
 
-    @cached_property
+    @computed_once
     def _by_name(self) -> Mapping[str, Parameter]:
         found: dict[str, Parameter] = {}
         for parameter in reversed(self.parameters):
             found |= dict.fromkeys((parameter.name, *self.limb_names[parameter.name]), parameter)
         return found
 
-    @cached_property
+    @computed_once
     def limb_names(self) -> Mapping[str, tuple[str, ...]]:
         """Of each parameter the names that set one limb each; none where it is one for all limbs."""
         return {

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from tpm_design.computed_once import computed_once
 from tpm_design.metrics.base import Measurement, Metric, Nearby, of_positions
 from tpm_design.metrics.context import Context
 from tpm_design.metrics.following import (
@@ -59,7 +59,7 @@ class _MovingLocus:
     part: int
     found: LocusDistance
 
-    @cached_property
+    @computed_once
     def _motion(self) -> LocusMotion | None:
         own = self.context
         return locus_motion(own.mechanism, own.mode, own.placed, self.part, self.found)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 
+from tpm_design.computed_once import computed_once
 from tpm_design.mechanisms.base import MechanismKind
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.metrics.base import Measurement, Metric, Nearby, Option
@@ -136,7 +137,7 @@ class MovingConditioning:
     options: Mapping[str, Any]
     averages: tuple[Averages, Averages]
 
-    @cached_property
+    @computed_once
     def _means(self) -> tuple[MovingMean, ...]:
         machine, mode, frobenius, motor = self._measured_by
         nodes = GAUSS_NODES[self.options["over"]]
@@ -145,7 +146,7 @@ class MovingConditioning:
             for boundary, count in zip(self.moving.boundaries, nodes, strict=True)
         )
 
-    @cached_property
+    @computed_once
     def _levels(self) -> tuple[MovingLevel, ...]:
         machine, mode, frobenius, motor = self._measured_by
         return tuple(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tpm_design.computed_once import computed_once
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.mechanisms.pointwise import kept_sides
 from tpm_design.metrics.moving_fields import MovingFields
@@ -76,12 +76,12 @@ class Context:
             raise ValueError("this metric needs a region")
         return self.region
 
-    @cached_property
+    @computed_once
     def grid(self) -> NDArray[np.float64]:
         """The region's lattice (I, J, K, 3) in metres."""
         return lattice(self.placed, self.region_samples)
 
-    @cached_property
+    @computed_once
     def poses(self) -> NDArray[np.float64]:
         """The lattice as (N, 3)."""
         return np.ascontiguousarray(self.grid.reshape(-1, 3))
@@ -102,7 +102,7 @@ class Context:
             self.mechanism.geometry, self.mode.signs, self.placed, indices, self.poses, self.spacing
         )
 
-    @cached_property
+    @computed_once
     def reach(self) -> Extreme:
         """Least workspace margin (m) over the region: negative by the worst shortfall, or by the depth to
         which a line on which a limb is folded enters the region."""
@@ -114,7 +114,7 @@ class Context:
             return replace(found, pieces=pieces)
         return replace(found, value=nearest.value, pose=nearest.pose, pieces=pieces)
 
-    @cached_property
+    @computed_once
     def reach_near(self) -> IndicesNear:
         """Reach at the poses of its pieces, for neighbouring designs."""
         return IndicesNear([Index(REACH)], self.reach.piece_poses[None, :, :], self.placed.centre)
@@ -124,19 +124,19 @@ class Context:
         """Whether the whole region is reachable in the mode."""
         return self.reach.value >= 0.0
 
-    @cached_property
+    @computed_once
     def lattice_determinants(self) -> NDArray[np.float64]:
         """Signed determinants (D, I, J, K) on the lattice, 0 where undefined."""
         margins = self.mechanism.determinants_at(self.poses, self.mode)
         return margins.reshape(len(margins), *self.grid.shape[:3])
 
-    @cached_property
+    @computed_once
     def lattice_sides(self) -> tuple[float, ...]:
         """The side, ±1, that each determinant mostly keeps on the lattice."""
         values = self.lattice_determinants
         return tuple(kept_sides(values.reshape(len(values), -1)).tolist())
 
-    @cached_property
+    @computed_once
     def sides(self) -> tuple[Sides, ...]:
         """Every determinant over the region, in the order of the mechanism; none counts for less than
         ``POLE``."""
@@ -153,7 +153,7 @@ class Context:
             for index, found in zip(indices, self.extremes(*indices), strict=True)
         )
 
-    @cached_property
+    @computed_once
     def sides_near(self) -> IndicesNear:
         """Every determinant at the poses of its pieces, for neighbouring designs."""
         poses = np.array([side.extreme.piece_poses for side in self.sides])
@@ -164,12 +164,12 @@ class Context:
         kind = self.mechanism.kind
         return self.sides[kind.determinants.index(kind.guard(drive))]
 
-    @cached_property
+    @computed_once
     def _survey(self) -> Survey:
         order = max(3, round(SURVEY_RAYS_PER_SAMPLE * self.region_samples))
         return survey(self.mechanism, self.mode, order=order)
 
-    @cached_property
+    @computed_once
     def _feelers(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return feelers(self.placed, max(3, round(FEELERS_PER_SAMPLE * self.region_samples)))
 
@@ -203,7 +203,7 @@ class Context:
         ]
         return max(spans, key=lambda span: (span.value, span.error))
 
-    @cached_property
+    @computed_once
     def size(self) -> Span:
         """Longest side (m) of the bounding box of the joint centres over the region."""
         return self.widest([Index(EXTENT, part=axis) for axis in range(3)])
@@ -214,18 +214,18 @@ class Context:
         orders = order, coarser(order)
         return mode_fields(self.mechanism, self.mode, orders=orders, sided=sided, floor=margin)
 
-    @cached_property
+    @computed_once
     def aspects(self) -> tuple[RayField, RayField]:
         """Ray fields of the mode's aspects, fine and coarse."""
         return self.mode_rays(0.0, sided=True)
 
-    @cached_property
+    @computed_once
     def region_aspects(self) -> tuple[RayField, RayField]:
         """Ray fields of the region's parts in each aspect, fine and coarse."""
         order = max(3, (rays_for(self.volume_rtol) + 1) // 3)
         return region_fields(self.mechanism, self.mode, self.placed, orders=(order, order - 1))
 
-    @cached_property
+    @computed_once
     def moving_aspects(self) -> MovingFields | None:
         """The largest aspect by each of ``aspects``, ready to be moved; None where one found none."""
         fine, coarse = (field.largest() for field in self.aspects)
@@ -233,7 +233,7 @@ class Context:
             return None
         return MovingFields(self.mechanism, self.mode, self.aspects, (fine, coarse), 0.0)
 
-    @cached_property
+    @computed_once
     def moving_region_aspects(self) -> MovingFields | None:
         """``region_aspects``, ready to be moved; None where one of them is empty."""
         fields = self.region_aspects
@@ -241,7 +241,7 @@ class Context:
             return None
         return MovingFields(self.mechanism, self.mode, fields, (None, None), 0.0, of_region=True)
 
-    @cached_property
+    @computed_once
     def _moved(self) -> dict[MovingFields, tuple[RayField, RayField]]:
         return {}
 

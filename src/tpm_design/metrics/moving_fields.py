@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
+from tpm_design.computed_once import computed_once
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.aspects import RayField
 from tpm_design.workspace.moving_boundary import (
@@ -30,7 +30,7 @@ class MovingFields:
     floor: float | None
     of_region: bool = False
 
-    @cached_property
+    @computed_once
     def boundaries(self) -> tuple[MovingBoundary, ...]:
         """Of the fine field and of the coarse one."""
         return tuple(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from tpm_design.computed_once import computed_once
 from tpm_design.metrics.base import FloatArray
 from tpm_design.metrics.context import Context
 from tpm_design.workspace.extremes import IndicesNear
@@ -19,12 +19,12 @@ class Neighbourhood:
 
     contexts: tuple[Context, ...]
 
-    @cached_property
+    @computed_once
     def radii(self) -> FloatArray:
         """Reach radii (N,) of the machines, m."""
         return np.array([context.mechanism.reach_radius() for context in self.contexts])
 
-    @cached_property
+    @computed_once
     def _found(self) -> dict[IndicesNear, FloatArray]:
         return {}
 

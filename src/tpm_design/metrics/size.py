@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tpm_design.computed_once import computed_once
 from tpm_design.metrics.base import Measurement, Metric, Nearby, Option
 from tpm_design.metrics.context import Context
 from tpm_design.metrics.following import by_two_orders, span_measurement
@@ -56,7 +56,7 @@ class _MovingExtent:
 
     moving: MovingFields
 
-    @cached_property
+    @computed_once
     def _outermost(self) -> tuple[NDArray[np.intp], ...]:
         machine, mode = self.moving.mechanism, self.moving.mode
         return tuple(

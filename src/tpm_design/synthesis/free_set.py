@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tpm_design.computed_once import computed_once
 from tpm_design.mechanisms.fold_lines import FoldLine
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.aspects import ball_field, mode_field
@@ -46,12 +46,12 @@ class FreeSet:
     sides: tuple[float, ...]
     floor: float
 
-    @cached_property
+    @computed_once
     def length(self) -> float:
         """A length (m) that no reachable pose is farther than from the origin."""
         return self.mechanism.reach_radius()
 
-    @cached_property
+    @computed_once
     def lines(self) -> tuple[FoldLine, ...]:
         """Lines of folded limbs, which no body may hold."""
         return self.mechanism.fold_lines()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tpm_design.arithmetic import inner, kernel
+from tpm_design.computed_once import computed_once
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.directions import ALL_OCTANTS, Octant, RaySet, ray_set
 from tpm_design.workspace.joined_sets import find, join
@@ -40,7 +41,7 @@ class RayField:
     middles: NDArray[np.float64]
     limits: NDArray[np.float64]
 
-    @cached_property
+    @computed_once
     def whole(self) -> float:
         """Volume of all the rays (m³)."""
         a, b, c = self.scale
