@@ -159,6 +159,16 @@ def test_libraries_stay_in_their_rooms(library: str) -> None:
     assert users <= OWNERS[library]
 
 
+def test_threads_share_no_lock_of_a_property() -> None:
+    """Until Python 3.12 ``functools.cached_property`` computes under one lock for all instances."""
+    assert [
+        path.relative_to(PACKAGE)
+        for path in MODULES
+        if room_of(path) != "checker"
+        and "functools.cached_property" in {name for name, _ in imported(tree_of(path))}
+    ] == []
+
+
 def test_heavy_libraries_and_drawings_are_imported_late() -> None:
     early = [
         f"{path.relative_to(PACKAGE)}:{line}: {name}"

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Generator, Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -37,6 +38,27 @@ STUDIES = sorted((Path(__file__).parents[1] / "studies").glob("*.yaml"))
 @pytest.fixture(scope="module")
 def problem() -> Problem:
     return load_study(STUDIES[0]).problem
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5])
+def test_a_queue_grows_between_results(problem: Problem, workers: int) -> None:
+    """Each result asks for two more until there are 60: every one ends, in places in the order of asking."""
+    asked, found = deque([0]), {}
+
+    def task(_: Problem, item: int) -> int:
+        time.sleep(1e-4 * (item % 7))
+        return item * item
+
+    with closing(Threads(workers)) as pool:
+        count = 1
+        for place, result in pool.from_queue(task, problem, asked):
+            found[place] = result
+            more = min(2, 60 - count)
+            asked.extend(range(count, count + more))
+            count += more
+        with closing(pool.from_queue(task, problem, deque(range(100)))) as results:
+            next(results)
+    assert found == {place: place * place for place in range(60)}
 
 
 def test_threads_give_every_result_and_drop_what_was_not_begun(problem: Problem) -> None:

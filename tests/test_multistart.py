@@ -48,7 +48,7 @@ class NotingSearch(MemoSearch):
 
     optima: list[FloatArray] = field(default_factory=list)
 
-    def in_pieces(self) -> Search:
+    def in_growing_pieces(self) -> Search:
         return self
 
     def note_optima(self, points: FloatArray) -> None:

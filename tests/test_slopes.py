@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Generator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -14,7 +16,7 @@ import tpm_design as tpm
 from tpm_design.evaluation.result import Evaluation
 from tpm_design.metrics.base import Measurement
 from tpm_design.metrics.context import Context
-from tpm_design.optimizers.base import Outcomes, Question, Slopes
+from tpm_design.optimizers.base import BudgetSpent, Outcomes, Question, Slopes
 from tpm_design.optimizers.watch import Watch
 from tpm_design.problem import Problem, Sample
 from tpm_design.runs.entry import Entry
@@ -65,7 +67,7 @@ def view(problem: Problem) -> UnitSearch:
 
 
 def with_slopes(seen: UnitSearch, point: np.ndarray) -> Outcomes:
-    (found,) = seen.answers([Question(point[None, :], sloped=True)])
+    (found,) = seen.answers(deque([Question(point[None, :], sloped=True)]))
     return found
 
 
@@ -164,6 +166,39 @@ def test_what_is_not_known_to_first_order_has_no_slopes(problem: Problem) -> Non
     assert with_slopes(seen, point).slopes == (None,)
 
 
+@pytest.mark.parametrize("workers", [1, 3])
+def test_what_is_asked_between_answers_comes_in_its_turn(problem: Problem, workers: int) -> None:
+    """New designs, known ones, slopes of known ones; what is beyond the budget ends it, after the rest."""
+    seen = view(problem)
+    first, *others, last = inner_points(seen.dimension, 5, 8)
+    expected = {point.tobytes(): seen.evaluate(point) for point in (first, *others)}
+    with closing(Threads(workers)) as threads:
+        log = EvaluationLog(problem, executor=threads)
+        asking = replace(seen, log=log, limit=4)
+        later = [
+            [Question(others[0][None, :]), Question(first[None, :], sloped=True)],
+            [Question(np.array([first, others[0], others[1]]))],
+            [Question(others[0][None, :], sloped=True)],
+            [Question(others[2][None, :]), Question(last[None, :]), Question(first[None, :])],
+        ]
+        asked = [Question(first[None, :])]
+        questions, found = deque(asked), []
+        with closing(asking.answers(questions)) as answers, pytest.raises(BudgetSpent):
+            for outcomes in answers:
+                found.append(outcomes)
+                more = later.pop(0) if later else []
+                asked += more
+                questions += more
+    assert len(found) == len(asked) - 2
+    assert len(log.entries) == 4
+    for question, outcomes in zip(asked, found, strict=False):
+        assert outcomes.objective.tolist() == [expected[p.tobytes()].objective[0] for p in question.points]
+        assert all((slopes is not None) == question.sloped for slopes in outcomes.slopes)
+    assert [seen.space.design(point) for point in (first, *others)] == [
+        entry.evaluation.design for entry in log.entries
+    ]
+
+
 def timeless(evaluation: Evaluation) -> dict[str, Any]:
     return entry_to_json(Entry(0, evaluation)) | {"seconds": 0.0}
 
@@ -204,9 +239,16 @@ class Counting:
     def as_they_end(
         self, task: partial[Any], problem: Problem, items: Sequence[Any]
     ) -> Generator[tuple[int, Any]]:
-        for place, item in enumerate(items):
+        return self.from_queue(task, problem, deque(items))
+
+    def from_queue(
+        self, task: partial[Any], problem: Problem, queue: deque[Any]
+    ) -> Generator[tuple[int, Any]]:
+        place = 0
+        while queue:
             self.asked += task.keywords["cutoff"] is None
-            yield place, task(problem, item)
+            yield place, task(problem, queue.popleft())
+            place += 1
 
     def close(self) -> None: ...
 

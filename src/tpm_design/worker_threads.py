@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import time
 from _thread import start_new_thread
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
 from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Generic, NoReturn, TypeVar
@@ -39,25 +40,34 @@ class WorkerThreads:
                 start_new_thread(_work, (number, self._present, self._asked))
 
     def as_they_end(
-        self, task: Callable[[Item], Result], items: Sequence[Item]
+        self, task: Callable[[Item], Result], items: Iterable[Item]
     ) -> Generator[tuple[int, Result]]:
         """The place of each item in ``items`` and what ``task(item)`` gave, in any order.
 
         Raises what a task raised. Once it is closed, items that were not begun are dropped, and none is under
         way; a second Ctrl-C ends that wait.
         """
+        return self.from_queue(task, deque(items))
+
+    def from_queue(self, task: Callable[[Item], Result], queue: deque[Item]) -> Generator[tuple[int, Result]]:
+        """As ``as_they_end``, of items that are taken from the left of a queue; others may be added to it
+        between results."""
+        asked = ended = 0
         if self.count <= 1:
-            for place, item in enumerate(items):
-                yield place, task(item)
+            while queue:
+                yield asked, task(queue.popleft())
+                asked += 1
             return
         batch, ahead = _Batch(task), AHEAD * self.count
         try:
-            for place, item in enumerate(items):
-                if place >= ahead:
-                    yield batch.next_result()
-                self._asked.put(partial(batch.carry_out, place, item))
-            for _ in range(min(ahead, len(items))):
-                yield batch.next_result()
+            while queue or ended < asked:
+                if queue and asked - ended < ahead:
+                    self._asked.put(partial(batch.carry_out, asked, queue.popleft()))
+                    asked += 1
+                else:
+                    result = batch.next_result()
+                    ended += 1
+                    yield result
         finally:
             batch.drop()
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections import deque
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -102,10 +103,13 @@ class Question:
 class SlopedSearch(Search, Protocol):
     """A search that may know slopes."""
 
-    def answers(self, questions: Sequence[Question]) -> Generator[Outcomes]:
-        """As ``evaluate``, each question's values as soon as they and those before them are there, while the
-        others are still being evaluated; with slopes where they are asked for, which cost less than an
-        evaluation and do not count as one. Raises BudgetSpent."""
+    def answers(self, questions: deque[Question]) -> Generator[Outcomes]:
+        """As ``evaluate``, of questions that are taken from the left of a queue: each one's values as soon as
+        they and those before are there. More may be asked between them, as long as one is not answered.
+
+        Slopes, where they are asked for, cost less than an evaluation and do not count as one. Raises
+        BudgetSpent.
+        """
         ...
 
 

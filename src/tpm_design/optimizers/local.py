@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+from contextlib import closing
+
 import numpy as np
 
 from tpm_design.optimizers.base import Abilities, FloatArray, Optimizer
@@ -18,13 +21,14 @@ def _walk(start: FloatArray) -> Walk:
 def descent(watch: Watch, seed: int) -> str:
     """From ``start`` downhill. Raises BudgetSpent."""
     walk = _walk(watch.start)
-    asked = next(walk)
-    while True:
-        try:
-            (found,) = watch.answers([asked])
-            asked = walk.send(found)
-        except StopIteration:
-            return "Converged: no step leads further downhill."
+    questions = deque([next(walk)])
+    with closing(watch.answers(questions)) as answers:
+        for found in answers:
+            try:
+                questions.append(walk.send(found))
+            except StopIteration:
+                break
+    return "Converged: no step leads further downhill."
 
 
 METHODS = (

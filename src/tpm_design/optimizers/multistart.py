@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass
@@ -68,8 +69,8 @@ Task = Generator[Question, Outcomes, None]
 class PiecewiseSearch(Protocol):
     """A search that can give its constraints in smooth pieces, and keeps what its method calls optima."""
 
-    def in_pieces(self) -> Search:
-        """The same search, each constraint in as many pieces as the points so far had."""
+    def in_growing_pieces(self) -> Search:
+        """The same search, each answer's constraints in as many pieces as the points up to it had."""
         ...
 
     def note_optima(self, points: FloatArray) -> None:
@@ -122,7 +123,10 @@ class _UnderWay:
 class _Course:
     def __init__(self, search: Search, seed: int) -> None:
         self._search = search
-        self._whole = self._pieces = Watch(search)
+        self._whole = Watch(search)
+        self._pieces = self._whole
+        if isinstance(search, PiecewiseSearch):
+            self._pieces = Watch(search.in_growing_pieces())
         self._levels = self._whole.levels
         self._free = np.flatnonzero(self._levels == 0)
         self._designs = np.inf if len(self._free) else prod(self._levels.tolist())
@@ -136,46 +140,32 @@ class _Course:
 
     def run(self) -> str:
         self._starts.sample()
-        under_way: list[_UnderWay] = []
-        while not self._few_left() and not self._converged():
-            while len(under_way) < self._abreast:
-                task = self._next_task()
-                if (first := next(task, None)) is not None:
-                    under_way.append(_UnderWay(task, first))
-            # a search goes on as soon as its question is answered, while those of others are being evaluated
-            with closing(self._answers([one.asked for one in under_way])) as answers:
-                for one, outcomes in zip(under_way, answers, strict=True):
-                    one.go_on(outcomes)
-            self._left = [*self._left, *(one.best for one in under_way if one.over and one.best)]
-            under_way = [one for one in under_way if not one.over]
+        under_way: deque[_UnderWay] = deque()
+        questions: deque[Question] = deque()
+        # the oldest question is always the next to be answered: so where searches go does not depend on how
+        # long evaluations take, and while one of them goes on, others are being evaluated
+        with closing(self._pieces.answers(questions)) as answers:
+            while not self._few_left() and not self._converged():
+                while len(under_way) < self._abreast:
+                    task = self._next_task()
+                    if (first := next(task, None)) is not None:
+                        under_way.append(_UnderWay(task, first))
+                        questions.append(first)
+                one = under_way.popleft()
+                found = next(answers)
+                if any(slopes is not None for slopes in found.slopes):
+                    self._abreast = SLOPED_ABREAST
+                one.go_on(found)
+                if not one.over:
+                    under_way.append(one)
+                    questions.append(one.asked)
+                elif one.best:
+                    self._left.append(one.best)
         if self._designs <= ENUMERATED:
             self._enumerate()
             return "Converged: every design was evaluated."
         hits = sum(optimum.hits for optimum in self._best_ones())
         return f"Converged: {hits} of {self._landed} independent local searches ended at the best objective."
-
-    def _answers(self, questions: list[Question]) -> Generator[Outcomes]:
-        """Outcomes with the constraints in pieces: in more of them once a design has more."""
-        with closing(self._pieces.answers(questions)) as answers:
-            for number, outcomes in enumerate(answers):
-                if self._more_pieces():
-                    # what is being evaluated comes to its end, and is asked again in more pieces
-                    list(answers)
-                    yield from self._answers(questions[number:])
-                    return
-                if any(slopes is not None for slopes in outcomes.slopes):
-                    self._abreast = SLOPED_ABREAST
-                yield outcomes
-
-    def _more_pieces(self) -> bool:
-        """Whether a design has more pieces than were asked for so far; from here on they are."""
-        if not isinstance(self._search, PiecewiseSearch):
-            return False
-        pieces = self._search.in_pieces()
-        if pieces.constraint_count == self._pieces.constraint_count:
-            return False
-        self._pieces = Watch(pieces)
-        return True
 
     # ------------------------------------------------------------------------------ what is begun
 

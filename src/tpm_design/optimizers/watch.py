@@ -7,8 +7,9 @@ answers nothing more afterwards, and ``watched`` lets it out again whatever the 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from collections import deque
+from collections.abc import Callable, Generator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,21 +75,30 @@ class Watch:
         """
         return self._asked(points, self.search.evaluate)
 
-    def answers(self, questions: Sequence[Question]) -> Generator[Outcomes]:
-        """As ``evaluate``, of each question in turn, and with the slopes that are asked for, where the search
-        knows them."""
-        points = np.vstack([question.points for question in questions])
-        ends = np.cumsum([0, *(len(question.points) for question in questions)]).tolist()
-        parts = [slice(*pair) for pair in itertools.pairwise(ends)]
+    def answers(self, questions: deque[Question]) -> Generator[Outcomes]:
+        """As ``SlopedSearch``; of a search that knows no slopes without them, and what is asked meanwhile
+        waits until the questions before it are answered."""
         search = self.search
-        if not isinstance(search, SlopedSearch):
-            found = self.evaluate(points)
-            yield from (found.part(rows) for rows in parts)
+        if isinstance(search, SlopedSearch):
+            inside: deque[Question] = deque()
+            with self._watching(), closing(search.answers(inside)) as answers:
+                self._pass_on(questions, inside)
+                for found in answers:
+                    yield found
+                    self._pass_on(questions, inside)
             return
-        with self._watching():
-            inside = self._inside(points)
-            moved = [replace(one, points=inside[rows]) for one, rows in zip(questions, parts, strict=True)]
-            yield from search.answers(moved)
+        while questions:
+            sizes = [len(question.points) for question in questions]
+            points = np.vstack([question.points for question in questions])
+            questions.clear()
+            found = self.evaluate(points)
+            for first, last in itertools.pairwise(itertools.accumulate(sizes, initial=0)):
+                yield found.part(slice(first, last))
+
+    def _pass_on(self, questions: deque[Question], inside: deque[Question]) -> None:
+        while questions:
+            question = questions.popleft()
+            inside.append(replace(question, points=self._inside(question.points)))
 
     def screen(self, points: FloatArray, keep: int) -> Outcomes:
         """As ``evaluate``, the ``keep`` best of them to the end; all where the search cannot screen."""
@@ -143,7 +153,7 @@ class Watch:
         Difference quotients over ± ``DIFFERENCE_STEP``: central, one-sided where a bound is nearer.
         """
         middle = np.clip(point, 0.0, 1.0)
-        (found,) = self.answers([Question(middle[None, :], sloped=True)])
+        (found,) = self.answers(deque([Question(middle[None, :], sloped=True)]))
         if found.slopes and found.slopes[0] is not None:
             return Tangents(float(found.objective[0]), found.constraints[0], found.slopes[0])
         size = self.dimension

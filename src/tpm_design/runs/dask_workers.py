@@ -121,6 +121,19 @@ class DaskWorkers:
             for first, results in chunks:
                 yield from enumerate(results, start=first)
 
+    def from_queue(
+        self, task: Callable[[Problem, Item], Result], problem: Problem, queue: deque[Item]
+    ) -> Generator[tuple[int, Result]]:
+        """As ``Executor``: what is added comes to the workers once what was there before has ended."""
+        ended = 0
+        while queue:
+            items = tuple(queue)
+            queue.clear()
+            with closing(self.as_they_end(task, problem, items)) as results:
+                for place, result in results:
+                    yield ended + place, result
+            ended += len(items)
+
     def _chunks_as_they_end(
         self, task: Callable[[Problem, Item], Result], problem: Problem, items: Sequence[Item]
     ) -> Generator[tuple[int, list[Result]]]:

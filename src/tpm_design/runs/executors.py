@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from typing import Protocol, TypeVar
@@ -34,6 +35,12 @@ class Executor(Protocol):
         items that were not begun are dropped.
         """
 
+    def from_queue(
+        self, task: Callable[[Problem, Item], Result], problem: Problem, queue: deque[Item]
+    ) -> Generator[tuple[int, Result]]:
+        """As ``as_they_end``, of items that are taken from the left of a queue; others may be added to it
+        between results, as long as one is not ended."""
+
     def close(self) -> None:
         """No more tasks; again harmless."""
 
@@ -58,6 +65,12 @@ class Threads:
     ) -> Generator[tuple[int, Result]]:
         """As ``Executor``."""
         return self._pool.as_they_end(partial(task, problem), items)
+
+    def from_queue(
+        self, task: Callable[[Problem, Item], Result], problem: Problem, queue: deque[Item]
+    ) -> Generator[tuple[int, Result]]:
+        """As ``Executor``."""
+        return self._pool.from_queue(partial(task, problem), queue)
 
     def close(self) -> None:
         """As ``Executor``."""

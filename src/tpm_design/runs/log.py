@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
+from typing import Literal
 
 from tpm_design.evaluation.cutoffs import is_worse
 from tpm_design.evaluation.evaluate import evaluate
@@ -18,6 +20,14 @@ from tpm_design.runs.entry import Answers, Entry, Key, design_key, samples_diges
 from tpm_design.runs.executors import Executor
 from tpm_design.runs.ranking import best_entry, rank
 from tpm_design.worker_threads import in_order
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A design, and the neighbours along which its slopes are asked for, None for none."""
+
+    design: Design
+    neighbours: Neighbours | None = None
 
 
 class EvaluationLog:
@@ -55,54 +65,58 @@ class EvaluationLog:
         self, designs: Sequence[Design], limit: int, cutoff: Cutoff | None = None
     ) -> list[Evaluation]:
         """``as_they_come``, all of them."""
-        with closing(self.as_they_come(designs, limit, cutoff)) as evaluations:
+        asked = deque(Asked(design) for design in designs)
+        with closing(self.as_they_come(asked, limit, cutoff)) as evaluations:
             return list(evaluations)
 
     def as_they_come(
-        self,
-        designs: Sequence[Design],
-        limit: int,
-        cutoff: Cutoff | None = None,
-        neighbours: Sequence[Neighbours | None] = (),
+        self, asked: deque[Asked], limit: int, cutoff: Cutoff | None = None
     ) -> Generator[Evaluation]:
-        """Evaluations of the designs, in order, each as soon as it and those before it are logged; repeated
-        ones are answered from the log, an aborted one only where ``cutoff`` would abort it as well: else it
-        becomes another entry. ``neighbours``: those of each design, None where its slopes are not asked for;
-        slopes alone make no other entry.
+        """Evaluations of what is taken from the left of a queue, in order, each as soon as it and those
+        before it are logged; more may be asked between them, as long as one is not given. Repeated designs
+        are answered from the log, an aborted one only where ``cutoff`` would abort it as well: else it
+        becomes another entry. Slopes alone make no other entry.
 
         Raises BudgetSpent once the log holds ``limit`` entries and another is needed; what fits is
         evaluated and logged first.
         """
-        keys = [design_key(design) for design in designs]
-        asked = {key: around for key, around in zip(keys, neighbours, strict=False) if around is not None}
-        wanted: dict[Key, _Wanted] = {}
-        left, beyond = max(0, limit - len(self.entries)), None
-        for key, design in zip(keys, designs, strict=True):
-            question = _Question(design, asked.get(key))
-            if key in wanted:
-                continue
-            if not self._is_known(key, cutoff):
-                if not left:
-                    beyond = key
-                    break
-                left -= 1
-                wanted[key] = _Wanted(question, self._answer(key, cutoff, sloped=key in asked))
-            elif key in asked and self._known(key).slopes is None:
-                wanted[key] = _Wanted(question, None, again=True)
-        open_ones = [one.question for one in wanted.values() if one.answer is None]
+        steps: deque[_Step] = deque()
+        coming: dict[Key, bool] = {}
+        left = limit - len(self.entries)
+        questions: deque[Asked] = deque()
         measured = partial(_answered, cutoff=cutoff)
-        with closing(self._executor.as_they_end(measured, self.problem, open_ones)) as evaluated:
+        with closing(self._executor.from_queue(measured, self.problem, questions)) as evaluated:
             results = in_order(evaluated)
-            for key in keys:
-                one = wanted.pop(key, None)
-                if one is not None and one.again:
-                    place = self._places[key]
-                    self.entries[place] = replace(self.entries[place], evaluation=next(results))
-                elif one is not None:
-                    self._append(key, one.answer or next(results))
-                elif key == beyond:
+            while asked or steps:
+                while asked:
+                    step = self._step(asked.popleft(), coming, cutoff)
+                    left -= step.kind == "new"
+                    if step.kind == "new" and left < 0:
+                        step = replace(step, kind="beyond")
+                    elif step.kind != "known" and step.answer is None:
+                        questions.append(step.asked)
+                    steps.append(step)
+                step = steps.popleft()
+                if step.kind == "beyond":
                     raise BudgetSpent
-                yield self._known(key)
+                if step.kind == "new":
+                    self._append(step.key, step.answer or next(results))
+                elif step.kind == "again":
+                    place = self._places[step.key]
+                    self.entries[place] = replace(self.entries[place], evaluation=next(results))
+                yield self._known(step.key)
+
+    def _step(self, asked: Asked, coming: dict[Key, bool], cutoff: Cutoff | None) -> _Step:
+        """``coming``: of the designs asked so far, whether their slopes are known by then."""
+        key, sloped = design_key(asked.design), asked.neighbours is not None
+        if key not in coming and self._is_known(key, cutoff):
+            coming[key] = self._known(key).slopes is not None
+        if key not in coming:
+            step = _Step(key, asked, "new", self._answer(key, cutoff, sloped=sloped))
+        else:
+            step = _Step(key, asked, "again" if sloped and not coming[key] else "known")
+        coming[key] = sloped or coming.get(key, False)
+        return step
 
     def _append(self, key: Key, result: Evaluation) -> None:
         self._places[key] = len(self.entries)
@@ -140,22 +154,15 @@ class EvaluationLog:
 
 
 @dataclass(frozen=True)
-class _Question:
-    """A design, and the neighbours along which its slopes are asked for, None for none."""
+class _Step:
+    """What is given for a question: a ``new`` entry, with its ``answer`` where it is stored; one of the log,
+    evaluated ``again`` for its slopes; a ``known`` one; nothing, ``beyond`` what may be evaluated."""
 
-    design: Design
-    neighbours: Neighbours | None
-
-
-@dataclass(frozen=True)
-class _Wanted:
-    """What is not in the log yet, or there without the slopes that are asked for (``again``); the ``answer``
-    where it is stored."""
-
-    question: _Question
-    answer: Evaluation | None
-    again: bool = False
+    key: Key
+    asked: Asked
+    kind: Literal["new", "again", "known", "beyond"]
+    answer: Evaluation | None = None
 
 
-def _answered(problem: Problem, question: _Question, cutoff: Cutoff | None) -> Evaluation:
-    return evaluate(problem, question.design, cutoff, question.neighbours)
+def _answered(problem: Problem, asked: Asked, cutoff: Cutoff | None) -> Evaluation:
+    return evaluate(problem, asked.design, cutoff, asked.neighbours)

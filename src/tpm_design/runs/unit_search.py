@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+from collections import deque
 from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from tpm_design.evaluation.result import Evaluation
 from tpm_design.evaluation.slopes import Neighbour, Neighbours
 from tpm_design.optimizers.base import Outcomes, Question
 from tpm_design.runs.entry import Entry
-from tpm_design.runs.log import EvaluationLog
+from tpm_design.runs.log import Asked, EvaluationLog
 from tpm_design.runs.outcomes import outcomes, slopes_of
 from tpm_design.runs.ranking import cutoff_at
 from tpm_design.synthesis.bound import relaxed_designs
@@ -41,7 +41,8 @@ class _Around:
 @dataclass(frozen=True)
 class UnitSearch:
     """A ``Search`` over a design space, up to ``limit`` entries in the log. ``sizes``: in how many smooth
-    pieces each constraint is given to the optimiser; ``objective_sizes``: each objective, empty for one."""
+    pieces each constraint is given to the optimiser; where ``growing``, in as many as a design so far had.
+    ``objective_sizes``: each objective, empty for one."""
 
     log: EvaluationLog
     space: DesignSpace
@@ -49,6 +50,7 @@ class UnitSearch:
     limit: int
     sizes: tuple[int, ...]
     objective_sizes: tuple[int, ...] = ()
+    growing: bool = False
 
     @property
     def dimension(self) -> int:
@@ -72,21 +74,36 @@ class UnitSearch:
         results = self.log.evaluations([self.space.design(point) for point in table], self.limit)
         return outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
 
-    def answers(self, questions: Sequence[Question]) -> Generator[Outcomes]:
+    def answers(self, questions: deque[Question]) -> Generator[Outcomes]:
         """As ``SlopedSearch``."""
-        around = [self._around(point) if q.sloped else None for q in questions for point in q.points]
-        designs = [self.space.design(point) for question in questions for point in question.points]
-        neighbours = [None if beside is None else beside.neighbours for beside in around]
-        with closing(self.log.as_they_come(designs, self.limit, neighbours=neighbours)) as evaluations:
-            pairs = zip(evaluations, around, strict=True)
-            for question in questions:
-                results, besides = zip(*itertools.islice(pairs, len(question.points)), strict=True)
-                found = outcomes(self.log.problem, results, self.sizes, self.objective_sizes)
-                slopes = tuple(
-                    None if beside is None else slopes_of(self.log.problem, result, self.sizes, beside.rates)
-                    for result, beside in zip(results, besides, strict=True)
-                )
-                yield replace(found, slopes=slopes)
+        asked: deque[Asked] = deque()
+        waiting: deque[tuple[_Around | None, ...]] = deque()
+        with closing(self.log.as_they_come(asked, self.limit)) as evaluations:
+            while questions or waiting:
+                while questions:
+                    question = questions.popleft()
+                    around = tuple(self._around(p) if question.sloped else None for p in question.points)
+                    for point, beside in zip(question.points, around, strict=True):
+                        neighbours = None if beside is None else beside.neighbours
+                        asked.append(Asked(self.space.design(point), neighbours))
+                    waiting.append(around)
+                around = waiting.popleft()
+                yield self._outcomes([(next(evaluations), beside) for beside in around])
+
+    def _outcomes(self, results: Sequence[tuple[Evaluation, _Around | None]]) -> Outcomes:
+        problem, sizes = self.log.problem, self._piece_counts if self.growing else self.sizes
+        found = outcomes(problem, [result for result, _ in results], sizes, self.objective_sizes)
+        slopes = tuple(
+            None if beside is None else slopes_of(problem, result, sizes, beside.rates)
+            for result, beside in results
+        )
+        return replace(found, slopes=slopes)
+
+    @property
+    def _piece_counts(self) -> tuple[int, ...]:
+        """Of each constraint: how many a design in the log had at most."""
+        most = self.log.most_pieces
+        return tuple(most.get(goal.label, 1) for goal in self.log.problem.constraints)
 
     def _around(self, point: FloatArray) -> _Around:
         """A neighbour along each continuous variable, towards the middle of the cube."""
@@ -117,12 +134,13 @@ class UnitSearch:
     def in_pieces(self) -> UnitSearch:
         """The same search, each constraint and objective in as many smooth pieces as a design in the log
         had."""
-        most, problem = self.log.most_pieces, self.log.problem
-        return replace(
-            self,
-            sizes=tuple(most.get(goal.label, 1) for goal in problem.constraints),
-            objective_sizes=tuple(most.get(goal.label, 1) for goal in problem.objectives),
-        )
+        most, objectives = self.log.most_pieces, self.log.problem.objectives
+        counts = tuple(most.get(goal.label, 1) for goal in objectives)
+        return replace(self, sizes=self._piece_counts, objective_sizes=counts)
+
+    def in_growing_pieces(self) -> UnitSearch:
+        """The same search, each answer's constraints in as many smooth pieces as a design up to it had."""
+        return replace(self, growing=True)
 
     def note_optima(self, points: FloatArray) -> None:
         """The local optima (N, n) that the method knows by now."""
