@@ -231,7 +231,7 @@ def test_a_run_that_was_cut_short_is_reported_from_its_log(run_folder: Path, tmp
     folder = tmp_path / "cut"
     folder.mkdir()
     (folder / "study.yaml").write_bytes((run_folder / "study.yaml").read_bytes())
-    (folder / LOG).write_bytes((run_folder / LOG).read_bytes() + b'{"id": 60, "desi')
+    (folder / LOG).write_bytes((run_folder / LOG).read_bytes() + b'{"id":60,"desi')
     assert read_reported(folder).best == whole.best
     markdown = report_of(folder)
     assert "The run was cut short: run.json is missing." in markdown

@@ -194,9 +194,9 @@ def test_what_does_not_belong_together_is_not_merged(
     assert f"{search}: This run is no sweep." in refused(tmp_path, first, search, third)
     (cut := altered(tmp_path / "d", second, "{", "{") / "run.json").unlink()
     assert f"{cut.parent}: This run was cut short" in refused(tmp_path, first, cut.parent, third)
-    moved = altered(tmp_path / "e", second, '"dp": 0.06', '"dp": 0.07', "evaluations.jsonl")
+    moved = altered(tmp_path / "e", second, '"dp":0.06', '"dp":0.07', "evaluations.jsonl")
     assert f"{moved}: Row 1 is not the plan's point 1." in refused(tmp_path, first, moved, third)
-    beyond = altered(tmp_path / "f", whole[1], '{"id": 24,', '{"id": 25,', "evaluations.jsonl")
+    beyond = altered(tmp_path / "f", whole[1], '{"id":24,', '{"id":25,', "evaluations.jsonl")
     assert "Point 24 is in none of these runs" in refused(tmp_path, beyond)
 
 

@@ -71,7 +71,7 @@ def test_a_sweep_killed_again_and_again_ends_as_if_it_had_not_been(
 
 
 def test_points_of_the_log_are_not_evaluated_again(run: Path, whole: Path) -> None:
-    cut(run, (run / "evaluations.jsonl").read_bytes().index(b'{"id": 30,') + 40)
+    cut(run, (run / "evaluations.jsonl").read_bytes().index(b'{"id":30,') + 40)
     kept = seconds(run)
     assert set(kept) == set(range(30))
     outcome = tpm_design("sweep", run / "study.yaml", "--resume", run, "--quiet")
@@ -93,7 +93,7 @@ def test_a_finished_sweep_is_written_again_as_it_is(run: Path, whole: Path) -> N
 def test_a_row_of_another_design_is_not_believed(run: Path, whole: Path) -> None:
     log = run / "evaluations.jsonl"
     text = log.read_text(encoding="utf-8")
-    log.write_text(text.replace('"dp": 0.06', '"dp": 0.061', 1), encoding="utf-8")
+    log.write_text(text.replace('"dp":0.06', '"dp":0.061', 1), encoding="utf-8")
     assert tpm_design("sweep", run / "study.yaml", "--resume", run, "--quiet").code == 0
     assert without_resume(run) == without_resume(whole)
     assert summary_of(run)["resumed_after"] == 49
@@ -104,7 +104,7 @@ def test_a_design_that_a_list_holds_twice_keeps_both_rows(tmp_path: Path) -> Non
     text = SWEPT[: SWEPT.index("sweep:")] + plan
     _, run = swept(tmp_path, text=text)
     expected = without_resume(run)
-    cut(run, (run / "evaluations.jsonl").read_bytes().index(b'{"id": 1,'))
+    cut(run, (run / "evaluations.jsonl").read_bytes().index(b'{"id":1,'))
     assert tpm_design("sweep", run / "study.yaml", "--resume", run, "--quiet").code == 0
     assert without_resume(run) == expected
 
