@@ -48,7 +48,7 @@ def singularity_row(geometry, mode, x, y, z, determinants):  # type: ignore[no-u
             determinants[k, n] = values[k]
 
 
-@kernel
+@short_kernel
 def determinant_table(geometry, mode, points):  # type: ignore[no-untyped-def]
     """Signed determinants (D, N) at poses (N, 3), 0 where undefined."""
     x, y, z = rows_of(points)

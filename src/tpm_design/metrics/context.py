@@ -19,7 +19,7 @@ from tpm_design.workspace.indices import DETERMINANT, EXTENT, REACH, Index
 from tpm_design.workspace.loci import LocusDistance, locus_distance
 from tpm_design.workspace.region_geometry import PlacedRegion
 from tpm_design.workspace.sampling import feelers, lattice
-from tpm_design.workspace.survey import Survey, survey, survey_crossings
+from tpm_design.workspace.survey import Survey, survey
 from tpm_design.workspace.volume import coarser, rays_for
 
 FEELERS_PER_SAMPLE = 0.8
@@ -188,7 +188,7 @@ class Context:
             grid=self.grid,
             feeler_points=points,
             feeler_normals=normals,
-            known=survey_crossings(self.mechanism, self.mode, self._survey, part),
+            seen=self._survey,
             spacing=self.spacing,
             limit=2.0 * self.mechanism.reach_radius(),
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter, defaultdict
 from collections.abc import Mapping
 from functools import partial
 from typing import Any, TypeVar
@@ -112,17 +113,18 @@ def _largest_share(context: Context, field: RayField) -> float:
     """Share of the region in one aspect; parts of equal sides may be joined outside the region."""
     if not field.volumes.size:
         return 0.0
-    codes = field.sides
-    shared = np.flatnonzero(np.bincount(codes)[codes] > 1)
-    aspects = np.zeros_like(codes)
-    if shared.size:
-        aspects[shared] = context.aspects_of(context.aspects[0], field.middles[shared])
-        # what lies in no aspect is joined with nothing
-        lost = shared[aspects[shared] < 0]
-        aspects[lost] = -1 - lost
-    totals: dict[tuple[int, int], float] = {}
-    for key, volume in zip(zip(codes.tolist(), aspects.tolist(), strict=True), field.volumes, strict=True):
-        totals[key] = totals.get(key, 0.0) + float(volume)
+    codes = field.sides.tolist()
+    times = Counter(codes)
+    shared = [part for part, code in enumerate(codes) if times[code] > 1]
+    aspects = [0] * len(codes)
+    if shared:
+        found = context.aspects_of(context.aspects[0], field.middles[shared])
+        for part, aspect in zip(shared, found.tolist(), strict=True):
+            # what lies in no aspect is joined with nothing
+            aspects[part] = aspect if aspect >= 0 else -1 - part
+    totals: dict[tuple[int, int], float] = defaultdict(float)
+    for key, volume in zip(zip(codes, aspects, strict=True), field.volumes.tolist(), strict=True):
+        totals[key] += volume
     return max(totals.values()) / field.whole
 
 

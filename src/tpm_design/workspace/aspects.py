@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tpm_design.arithmetic import inner, kernel
+from tpm_design.arithmetic import inner, kernel, short_kernel
 from tpm_design.computed_once import computed_once
 from tpm_design.mechanisms.mechanism import Mechanism, Mode
 from tpm_design.workspace.directions import ALL_OCTANTS, Octant, RaySet, ray_set
@@ -185,8 +185,17 @@ def _from_origin(
     mechanism: Mechanism, mode: Mode, rays: tuple[RaySet, RaySet], *, sided: bool, floor: float
 ) -> tuple[RayField, RayField]:
     radius = max(mechanism.reach_half_axes())
-    limits = radius / rays[0].lengths, radius / rays[1].lengths
+    limits = _limits(radius, rays[0].lengths), _limits(radius, rays[1].lengths)
     return _fields(mechanism, mode, rays, limits, sided=sided, floor=floor, scale=mode_scale(mechanism))
+
+
+@short_kernel
+def _limits(radius, lengths):  # type: ignore[no-untyped-def]
+    """Where rays of such lengths (N,) leave a ball."""
+    out = np.empty(lengths.size)
+    for n in range(lengths.size):
+        out[n] = radius / lengths[n]
+    return out
 
 
 def mode_scale(mechanism: Mechanism) -> tuple[float, float, float]:
@@ -198,7 +207,7 @@ def mode_scale(mechanism: Mechanism) -> tuple[float, float, float]:
 
 def reach_parts(mechanism: Mechanism, mode: Mode, rays: RaySet) -> Segments:
     """The parts of rays from the origin that are within reach in the mode."""
-    limits = mechanism.reach_radius() / rays.lengths, np.empty(0)
+    limits = _limits(mechanism.reach_radius(), rays.lengths), np.empty(0)
     return _fields(mechanism, mode, (rays, NO_RAYS), limits, sided=False, scale=(1.0, 1.0, 1.0))[0].segments
 
 

@@ -21,6 +21,7 @@ from tpm_design.mechanisms.pointwise import reach_row, singularity_row
 from tpm_design.workspace.indices import determinant_at
 from tpm_design.workspace.poses import workspace_margin
 from tpm_design.workspace.region_geometry import PlacedRegion, nearest, perpendicular, signed_distance
+from tpm_design.workspace.survey import Survey, crossings
 
 CANDIDATES = 4
 TRIES = 12
@@ -470,10 +471,11 @@ def _starts(inside, feeler_points, feeler_normals, ways, known):  # type: ignore
 
 @kernel
 def _nearest_locus(  # type: ignore[no-untyped-def]
-    geometry, mode, region, part, determinants, grid, feeler_points, feeler_normals, known, spacing, limit
+    geometry, mode, region, part, determinants, grid, feeler_points, feeler_normals, seen, spacing, limit
 ):
     """As ``locus_distance``: least distance and its pose (2, 4) from all starts and from half of them."""
     inside = _lattice_crossings(determinants[part], grid)
+    known = crossings(geometry, mode, part, seen)
     if known.shape[0] > 0:
         # what lies beyond a known point of the locus is not the nearest
         nearest_known = math.inf
@@ -512,15 +514,15 @@ def locus_distance(
     grid: NDArray[np.float64],
     feeler_points: NDArray[np.float64],
     feeler_normals: NDArray[np.float64],
-    known: NDArray[np.float64],
+    seen: Survey,
     spacing: float,
     limit: float,
 ) -> LocusDistance:
     """Distance to the locus of one determinant, for a region that is reachable throughout.
 
     ``grid`` (I, J, K, 3): the region's lattice; ``determinants`` (D, I, J, K) on it; feelers as of
-    ``sampling.feelers``; ``known`` (N, 3): points of the locus found elsewhere; ``spacing`` (m) of the
-    lattice; ``limit`` (m) at which feelers end at the latest.
+    ``sampling.feelers``; ``seen``: of the whole mode; ``spacing`` (m) of the lattice; ``limit`` (m) at which
+    feelers end at the latest.
     """
     fine, coarse = _nearest_locus(
         geometry,
@@ -531,7 +533,7 @@ def locus_distance(
         grid,
         feeler_points,
         feeler_normals,
-        known,
+        (seen.poses, seen.pairs, seen.determinants),
         spacing,
         limit,
     ).tolist()

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from tpm_design.arithmetic import short_kernel
 from tpm_design.workspace.directions import ALL_OCTANTS, ray_set
 from tpm_design.workspace.region_geometry import BOX, CYLINDER, POINTS, PlacedRegion
 
@@ -18,7 +19,19 @@ def lattice(region: PlacedRegion, samples: int) -> FloatArray:
     each other in the array where they are in space. Points: (N, 1, 1, 3) as they are."""
     if region.form == POINTS:
         return region.points.reshape(-1, 1, 1, 3)
-    return _lattice_about_centre(region.form, region.half, samples) + np.asarray(region.centre)
+    about_centre = _lattice_about_centre(region.form, region.half, samples)
+    moved: FloatArray = _moved(about_centre.reshape(-1, 3), region.centre)
+    return moved.reshape(about_centre.shape)
+
+
+@short_kernel
+def _moved(points, centre):  # type: ignore[no-untyped-def]
+    """Points (N, 3) about a centre that was the origin."""
+    out = np.empty(points.shape)
+    for n in range(points.shape[0]):
+        for axis in range(3):
+            out[n, axis] = points[n, axis] + centre[axis]
+    return out
 
 
 @lru_cache(maxsize=16)
@@ -53,7 +66,7 @@ def feelers(region: PlacedRegion, samples: int) -> tuple[FloatArray, FloatArray]
         fan = _sphere(3)
         return np.repeat(region.points, len(fan), axis=0), np.tile(fan, (len(region.points), 1))
     points, normals = _feelers_about_centre(region.form, region.half, samples)
-    return np.asarray(region.centre) + points, normals
+    return _moved(points, region.centre), normals
 
 
 @lru_cache(maxsize=16)

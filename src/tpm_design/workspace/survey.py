@@ -126,9 +126,11 @@ def _between(geometry, mode, part, p, q):  # type: ignore[no-untyped-def]
     return p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1]), p[2] + t * (q[2] - p[2])
 
 
-@kernel
-def _crossings(geometry, mode, part, poses, pairs, values):  # type: ignore[no-untyped-def]
-    """Poses (N, 3) near which one determinant changes sign between neighbours of the grids."""
+@inner
+def crossings(geometry, mode, part, seen):  # type: ignore[no-untyped-def]
+    """Poses (N, 3) near which one determinant changes sign between neighbours of the grids: close to its
+    locus, all over the mode's workspace. ``seen``: as ``Survey`` has them."""
+    poses, pairs, values = seen[0], seen[1], seen[2][part]
     count = 0
     for s in range(values.shape[0]):
         for k in range(1, values.shape[1]):
@@ -150,11 +152,3 @@ def _crossings(geometry, mode, part, poses, pairs, values):  # type: ignore[no-u
                 out[count] = _between(geometry, mode, part, poses[a, k], poses[b, k])
                 count += 1
     return out
-
-
-def survey_crossings(mechanism: Mechanism, mode: Mode, seen: Survey, part: int) -> NDArray[np.float64]:
-    """Poses (N, 3) close to the locus of one determinant, all over the mode's workspace."""
-    found: NDArray[np.float64] = _crossings(
-        mechanism.geometry, mode.signs, part, seen.poses, seen.pairs, seen.determinants[part]
-    )
-    return found
