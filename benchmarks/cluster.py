@@ -66,7 +66,7 @@ def overhead(problem: Problem, items: list[Evaluation]) -> list[Row]:
             each = 1e3 * sum(item.seconds for item in chosen) / len(chosen)
             rows.append(
                 Row(
-                    f"{len(chosen)} evaluations of {each:.0f} ms {name}",
+                    f"{len(chosen)} evaluations of {each:.1f} ms {name}",
                     f"{ours:.2f} s on {WORKERS} Dask workers",
                     f"{peer:.2f} s on {WORKERS} threads",
                     f"{ours / peer:.3f} × the time",

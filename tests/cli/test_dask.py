@@ -100,6 +100,8 @@ def test_local_workers_have_one_thread_each_and_end_with_the_run(tmp_path: Path)
         names = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"]
         found = dict(cluster.as_they_end(environment, problem, names))
         assert found == dict.fromkeys(range(4), "1")
+        # an evaluation would take a tenth longer
+        assert dict(cluster.as_they_end(environment, problem, ["MALLOC_TRIM_THRESHOLD_"])) == {0: None}
         assert cluster.workers == 2
         begun = set(psutil.Process().children(recursive=True)) - before
         started = [child for child in begun if "spawn_main" in " ".join(child.cmdline())]

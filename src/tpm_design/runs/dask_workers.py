@@ -54,6 +54,10 @@ SECONDS_BETWEEN_COUNTS = 1.0
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Environment of local workers: as many of them as processors, each on one."""
 
+MEMORY_IS_KEPT: dict[str, None] = {"distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None}
+"""Dask has workers hand freed memory back at once. Kernels ask for as much again some microseconds later: an
+evaluation took a tenth longer."""
+
 QUIET = ("distributed", "distributed.client", "tornado", "tornado.application", "asyncio")
 """Loggers that would tell of lost connections in their own way."""
 
@@ -256,11 +260,12 @@ def _check_installed() -> None:
 @contextmanager
 def _local_cluster(processes: int) -> Iterator[Any]:
     """A scheduler in this process, so many workers in their own."""
+    import dask.config
     from distributed import LocalCluster
 
     cluster = None
     try:
-        with _interrupts_held_back():
+        with _interrupts_held_back(), dask.config.set(MEMORY_IS_KEPT):
             cluster = LocalCluster(
                 n_workers=processes,
                 threads_per_worker=1,
